@@ -47,6 +47,7 @@ test:  ## everything that must hold before a commit
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line setup lint client-check $(TESTS_STAMP)
 	$(if $(CHROMIUM),,@echo "No chromium on this machine: the browser tests (marker e2e) are left out.")
 	$(ONE_THREAD) $(BIN)/python -m pytest -m "$(MARKERS)" $(SHARED_OUT)
+	$(BIN)/relume bench --quick --check
 
 test-slow: setup  ## the long tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -m slow --timeout=3600

@@ -36,18 +36,18 @@ from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.normal_mapping import light_gradient
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.base import TransferMethod
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference import ReferencePoints, environment_texels, reference_radiance
 from relume.reference.btf_surfaces import sample_btf_surface
 from relume.scene.examples.still_life import demo_scene
 from relume.scene.model import Scene
 from relume.scene.scene_folder import load_scene, save_scene
-from relume.store import bake_in_process
-from relume.store.bake_protocol import Recipe
+from relume.store.bake_protocol import BakeMethod, Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE, NUM_LIGHTS, NUM_PROBES = (64, 48), 256, 4000  # enough lights to be grouped
 CACHE_BYTES = 1 << 28
@@ -93,7 +93,7 @@ def _temporary_scene() -> Iterator[tuple[Scene, Path]]:
         yield load_scene(Path(name) / "scene"), Path(name)
 
 
-def _exercise(method: TransferMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
+def _exercise(method: BakeMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
     """Bake, open, edit terms of some models, and move everything that can move."""
     recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_probes=NUM_PROBES)
     transfer: Any = open_bake(

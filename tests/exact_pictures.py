@@ -18,7 +18,7 @@ import numpy_reference as ref
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.protocols import FixedViewTransfer
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.output.render_image import render_image
 
 DERIVED_FOLDERS = ("derived", "edited")  # folders of images that sessions store

@@ -17,11 +17,9 @@ from typing import Any
 import numpy as np
 
 from relume.assets.environments.equirect import texel_solid_angles
-from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, LightsAndPoints, Samples
-from relume.methods.opened.described import read_fields
-from relume.methods.opened.fixed_views import BakedFixedViews, SelectedSamples
+from relume.live.opened.fixed_views import BakedFixedViews, SelectedSamples
 from relume.methods.store_layout import SHARD_ROWS
 from relume.methods.view_stages import CHUNK_ROWS, SampledViews
 from relume.patches.gather_hits import trace_gather_rays
@@ -73,7 +71,7 @@ class FurnaceViews(BakedFixedViews):
 
 
 class FurnaceMethod:
-    """Implements `relume.methods.base.TransferMethod`."""
+    """Implements `relume.store.bake_protocol.BakeMethod`."""
 
     name = "furnace"
     stages = ("samples", "hits")
@@ -133,7 +131,3 @@ class FurnaceMethod:
             gather_hits.num_rays,
             gather_hits.trace_s,
         )
-
-    def open(self, store: StoreReader, key: str, cache: Cache) -> FurnaceViews:
-        """Open the views, lit by the surfaces alone."""
-        return FurnaceViews(**read_fields(store, key, cache))

@@ -12,7 +12,7 @@ from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality
-from relume.methods.patch_direct_light import DirectPatchLight
+from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.radiosity.highlight_transport import outgoing_in_highlights
 from relume.radiosity.solve_bounces import solve_bounces
 from relume.raytrace.surface_points import SurfacePoints

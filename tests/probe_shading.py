@@ -9,8 +9,8 @@ from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS, NUM_ROWS
 from relume.live.free_camera.basis.table_index import MIN_COSINE
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.math.zernike import NUM_FUNCTIONS, recurrence
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -11,10 +11,11 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import VIEW
 from relume.core.cache import Cache
 from relume.live.fixed_camera.protocols import EditAxis
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import METHODS, open_transfer
-from relume.store import bake_in_process
+from relume.methods.registry import METHODS
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 BUDGET = 1 << 28
 
@@ -45,8 +46,18 @@ def run_until_exact(picture):
 def run_next_job(picture):
     """Run the pending job and return it."""
     need = picture.next_job()
-    picture.install(need, need.run(lambda fraction: None, lambda: False))
+    need.apply(need.run(lambda fraction: None, lambda: False))
     return need
+
+
+def kind_of(job):
+    """The kind of a job; None for no job."""
+    return None if job is None else job.kind
+
+
+def task_of(job):
+    """The target that a job's `run` is a method of."""
+    return job.run.__self__
 
 
 def has_pending_job(picture):

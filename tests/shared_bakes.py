@@ -10,11 +10,12 @@ from session_edits import bake_corner_scene
 from tiny_scenes import make_camera, make_tiny_scene, quad, still_life
 
 from relume.core.cache import Cache
-from relume.methods import free_camera_error
-from relume.methods.registry import METHODS, open_transfer
+from relume.live.opened import free_camera_error
+from relume.live.opened.openers import open_transfer
+from relume.methods.registry import METHODS
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 
 @pytest.fixture(scope="module", autouse=True)

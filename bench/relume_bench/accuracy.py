@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from relume.assets.environments.environment import Environment
 from relume.brdf.term_validation import complete_term
 from relume.core.jackknife import JackknifeEstimate
 from relume.raytrace.embree import EmbreeScene
@@ -24,7 +25,7 @@ from relume_bench.standard_error import estimate_point_error
 
 Case = tuple[str, dict[str, Any], str]
 
-_CASES: tuple[Case, ...] = (
+CASES: tuple[Case, ...] = (
     ("accuracy.lambert", LAMBERT, "theta_i"),
     ("accuracy.cook_torrance_0.2", cook_torrance(0.2), "theta_h"),
     ("accuracy.cook_torrance_0.05", cook_torrance(0.05), "theta_h"),
@@ -33,23 +34,24 @@ _CASES: tuple[Case, ...] = (
 
 def measure(tiny: bool) -> list[Figure]:
     """Measure the three terms that have targets."""
-    return compare(_CASES, 20 if tiny else 2000, tiny)
+    return compare(CASES, 20 if tiny else 2000, tiny, environments())
 
 
-def compare(cases: tuple[Case, ...], num_positions: int, tiny: bool) -> list[Figure]:
+def compare(cases: tuple[Case, ...], num_positions: int, tiny: bool, maps: list[Environment]) -> list[Figure]:
     """Measure a figure for each case; all share shadow rays.
 
     Args:
         cases: figure's name, term of pot and table, and free curve of each.
         num_positions: view samples.
         tiny: few lights, one environment, few texels.
+        maps: the environments.
     Returns:
         Worst error over the environments, and its standard error over the view samples.
     """
     num_lights = 200 if tiny else 4000
     errors: dict[str, dict[str, JackknifeEstimate]] = {name: {} for name, _, _ in cases}
     documents = {name: complete_term(("accuracy",), dict(term), None) for name, term, _ in cases}
-    for environment in environments()[: 1 if tiny else 3]:
+    for environment in maps[: 1 if tiny else 3]:
         scene = teapot_on_table(environment, (LAMBERT,), (LAMBERT,))
         lit_samples = sample_lit_surface(scene, (320, 320), num_positions, num_lights, None)
         texels, spp = environment_texels(environment), 500 if tiny else 0

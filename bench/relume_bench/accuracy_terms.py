@@ -9,6 +9,7 @@ from typing import Any
 
 from relume_bench.accuracy import Case, compare
 from relume_bench.figure import Figure
+from relume_bench.scenes import environments
 
 _PARAMS: dict[str, tuple[dict[str, Any], str]] = {
     "oren_nayar": ({"sigma": 0.5}, "theta_i"),
@@ -31,4 +32,4 @@ CASES: tuple[Case, ...] = tuple(
 
 def measure(tiny: bool) -> list[Figure]:
     """Measure every term except `lambert`, which has a figure with a target."""
-    return compare(CASES, 20 if tiny else 200, tiny)
+    return compare(CASES, 20 if tiny else 200, tiny, environments())

@@ -35,7 +35,7 @@ class BackgroundJobs:
         self._requested_s = time.perf_counter()
         if self._running is not None and self._running[1].done():
             job, future, self._displayed_request_s = self._running
-            self._picture.install(job, future.result())
+            job.apply(future.result())
             self._running = None
 
     def start_next(self) -> None:

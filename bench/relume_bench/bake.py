@@ -17,8 +17,9 @@ from relume.methods.direct import DirectMethod
 from relume.methods.store_layout import read_rays
 from relume.scene.examples.still_life import demo_scene
 from relume.scene.model import Scene
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import Recipe, TaskOutput
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.timing import seconds
 

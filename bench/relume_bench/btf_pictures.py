@@ -18,14 +18,15 @@ from relume.assets.environments.studio import studio
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.opened.openers import open_bake
 from relume.look import Look, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.synthetic_btf.synthesize import GEOMETRIES
 from relume.synthetic_btf.tileable_geometry import centered_height, repeat_tile
 from relume.transport.btf_kernel import texel_rows
@@ -43,7 +44,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     """Compare a plane covered with a BTF of the weave with the path-traced weave.
 
     Args:
-        record: of the BTF. folder: for stores. tiny: a trial run.
+        record: record of the BTF. folder: for stores. tiny: a trial run.
     """
     name = "btf.geometry_rmse"
     if (why := missing()) is not None:
@@ -73,7 +74,8 @@ def traced_by_peer(
     """Render the actual geometry with the peer, with paths of up to seven bounces.
 
     Args:
-        displaced_scene: the scene. size: of the view. spp: per pass. terms: of each mesh. to: folder to create.
+        displaced_scene: the scene. size: size of the view. spp: per pass. terms: terms of each mesh.
+        to: folder to create.
     Returns:
         (passes, height, width, 3) float32
     """
@@ -92,7 +94,8 @@ def bake_with_btf(plane: Scene, record: BtfRecord, size: tuple[int, int], path: 
     """Bake and open a fixed view of one material's surface, with the look that covers it.
 
     Args:
-        plane: the scene. record: of the BTF. size: of the view. path: of the store. lights: environment triangles.
+        plane: the scene. record: record of the BTF. size: size of the view. path: path of the store.
+        lights: environment triangles.
     """
     bake = open_bake(
         bake_in_process(METHODS["direct"], plane, Recipe("direct", ("camera",), size, lights), path), Cache(2 << 30)
@@ -107,14 +110,14 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
     Each sample uses the texel that contains it, on both sides, which excludes the error of interpolation.
 
     Args:
-        record: of the BTF. values: uncompressed. folder: for stores. tiny: a trial run.
+        record: record of the BTF. values: uncompressed. folder: for stores. tiny: a trial run.
     """
     plane, _ = _make_scenes(GEOMETRIES["weave"](), *_CAMERA_ANGLES[0])
     size = (12, 12) if tiny else (96, 96)
     bake, look = bake_with_btf(plane, record, size, folder / "table.zarr", 60 if tiny else 1000)
     view = bake.views["camera"]
     light = illumination_from_look(look, bake.material_names, has_bounces=False)
-    lights, receivers = bake.arriving(view, 0, light, bake.cache)
+    lights, receivers = bake.incident_light(bake.samples(view, 0, bake.cache), light)
     uv = _to_middles(receivers.uv, values.size)
     texels = TERMS["measured_btf"].normalized(dict(look.materials["Cloth"].terms[0])).texels
     assert texels is not None

@@ -24,12 +24,13 @@ from relume.assets.btf.local_pca_btf import LocalPcaBtf
 from relume.assets.btf.value_cache import ValueFile
 from relume.core.cache import Cache, use_for_assets
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake
 from relume.look import Look, validate
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.scene.examples.catalog import built_in
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.synthetic_btf.render import TileGeometry
 from relume.synthetic_btf.synthesize import GEOMETRIES
 from relume_bench.figure import Figure
@@ -72,7 +73,7 @@ class _Session:
         self._picture.set_look(self._look((0.5, 0.5, 0.5)))
         self._picture.advance(None)
         while (job := self._picture.next_job()) is not None:
-            self._picture.install(job, job.run(lambda share: None, lambda: False))
+            job.apply(job.run(lambda share: None, lambda: False))
             self._picture.advance(None)
         self._picture.encode(self._picture.all_tiles(), "rgb9e5")
 

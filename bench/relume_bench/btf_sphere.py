@@ -45,7 +45,7 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     """Compare a covered ball with the path-traced geometry around it.
 
     Args:
-        record: of the weave. folder: for stores. tiny: a trial run.
+        record: record of the weave. folder: for stores. tiny: a trial run.
     """
     name = "btf.sphere_rmse"
     if (why := missing()) is not None:

@@ -25,7 +25,7 @@ class SyntheticBtf:
     """A synthetic BTF before compression.
 
     Args:
-        name: of its geometry. folder: of its values. tiny: a trial run.
+        name: name of its geometry. folder: folder of its values. tiny: a trial run.
     """
 
     def __init__(self, name: str, folder: Path, tiny: bool) -> None:

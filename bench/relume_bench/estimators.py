@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
-from relume.methods.registry import open_transfer
-from relume.methods.store_layout import read_tree
+from relume.methods.patch_layout import read_tree
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import NO_PATCH, PatchTree
 from relume.raytrace.camera_rays import trace_rays

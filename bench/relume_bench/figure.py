@@ -13,7 +13,7 @@ class Figure:
     Attributes:
         value: None if it could not be measured; the context has the reason in "skipped".
         context: sizes, both sides of a ratio, the parts of a maximum.
-        standard_error: of a Monte Carlo estimate, in the same unit; None for all others.
+        standard_error: standard error of a Monte Carlo estimate, in the same unit; None for all others.
     """
 
     name: str
@@ -27,7 +27,7 @@ def skipped(names: tuple[str, ...], unit: str, why: str) -> list[Figure]:
     """Figures that this machine cannot measure.
 
     Args:
-        names: of the figures. unit: of the figures.
+        names: names of the figures. unit: unit of the figures.
         why: sentence for the context.
     """
     return [Figure(name, None, unit, {"skipped": why}) for name in names]

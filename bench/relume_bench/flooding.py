@@ -23,7 +23,7 @@ def flood(address: str, watch: str, kind: str, started: Event) -> None:
     """Send as fast as possible, until killed.
 
     Args:
-        address: of the session. watch: view token of the room. kind: one of `FLOOD_TYPES`.
+        address: address of the session. watch: view token of the room. kind: one of `FLOOD_TYPES`.
         started: set after a while of sending.
     """
     block = b"".join(_frame(_message(kind, revision)) for revision in range(1, _AT_ONCE))

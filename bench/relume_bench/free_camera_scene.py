@@ -16,15 +16,15 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.primary_visibility import trace_primary as look_around
-from relume.live.free_camera.refine_job import RefineHighlights
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake, open_transfer
 from relume.look import Look, complete, validate
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.catalog import built_in
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.background_jobs import BackgroundJobs
 from relume_bench.timing import percentiles
 
@@ -38,7 +38,7 @@ class Drag(NamedTuple):
     """Frame times of a drag.
 
     Attributes:
-        seconds: of each frame. lag_s: median age of the look whose indirect light is shown.
+        seconds: seconds of each frame. lag_s: median age of the look whose indirect light is shown.
     """
 
     seconds: list[float]
@@ -64,12 +64,12 @@ def run_update_jobs(picture: FreeCameraPicture) -> None:
 
 def run_light_jobs(picture: FreeCameraPicture | Picture) -> None:
     """Run the light jobs after a drag: all light is computed, without the refined frame, which is independent of it."""
-    while (job := picture.next_job()) is not None and not isinstance(job, RefineHighlights):
+    while (job := picture.next_job()) is not None and job.kind != "highlights":
         _run_job(picture, job)
 
 
 def _run_job(picture: FreeCameraPicture | Picture, job: Any) -> None:
-    picture.install(job, job.run(lambda share: None, lambda: False))
+    job.apply(job.run(lambda share: None, lambda: False))
     picture.advance(None)
 
 
@@ -77,7 +77,7 @@ class FreeCameraScene:
     """A built-in scene, baked for a free camera.
 
     Args:
-        name: of the scene. folder: for its stores. size: of images. tiny: a trial run.
+        name: name of the scene. folder: for its stores. size: size of images. tiny: a trial run.
         num_probes: approximate number; None: 50,000.
     """
 
@@ -147,7 +147,7 @@ class FreeCameraScene:
         """Show one look after another, each as soon as the frame of the previous one is encoded.
 
         Args:
-            frames: number. change: of the look's document, by the fraction of the drag. is_watched: interactive.
+            frames: number. change: change of the look's document, by the fraction of the drag. is_watched: interactive.
             on_frame: other changes to the image in each frame.
         Returns:
             Seconds from each look to its frame. No two drags use the same values, because results of edits are cached.

@@ -19,13 +19,13 @@ from relume.core.cache import Cache
 from relume.core.thread_pools import num_threads
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
 from relume.methods.gather import GatherMethod
-from relume.methods.registry import open_transfer
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe, Task, TaskOutput
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.timing import percentiles, seconds
 
@@ -77,7 +77,7 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
     """Bake in this process with the method `gather`.
 
     Args:
-        scene: to bake. recipe: of the bake.
+        scene: to bake. recipe: recipe of the bake.
         target: folder of the store.
     Returns:
         The store, wall seconds, and wall and tracing seconds and rays of every stage.

@@ -15,7 +15,7 @@ import numpy as np
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.protocols import FixedViewTransfer
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.scene.examples.cornell import GLOSSY_FLOOR, cornell_box
 from relume_bench.figure import Figure, skipped
 from relume_bench.gather import bake, make_recipe

@@ -20,8 +20,8 @@ import numpy as np
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import open_transfer
 from relume.scene.examples.cornell import cornell_box
 from relume_bench.figure import Figure
 from relume_bench.gather import bake, make_recipe, run_until_exact

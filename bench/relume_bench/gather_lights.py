@@ -24,8 +24,8 @@ from relume.camera.view_samples import BACKGROUND, sample_view
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import open_transfer
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Scene
@@ -67,7 +67,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 class _LightDrag(NamedTuple):
     """frames_s: seconds of each frame. prepared_s: one-time work: transport rows for a move, the light's image for
-    dimming. error: of the last frame, relative RMSE against the exact image.
+    dimming. error: error of the last frame, relative RMSE against the exact image.
     """
 
     frames_s: list[float]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import scatters_diffusely
 from relume.core.cache import Cache
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.scene.examples.catalog import built_in
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Scene
@@ -70,7 +70,7 @@ def render_pair(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool
     """Bake and render one of `SIZES` with both renderers.
 
     Args:
-        name: of the scene. spp: per Mitsuba pass. tiny: a trial run.
+        name: name of the scene. spp: per Mitsuba pass. tiny: a trial run.
         is_full: surfaces on the path reflect by all their terms; otherwise by diffuse ones.
     """
     scene = cornell_box(is_floor_glossy=True) if name == "cornell_box" else built_in(name)

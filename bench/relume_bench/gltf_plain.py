@@ -45,7 +45,7 @@ class File:
     """Contents of a file.
 
     Attributes:
-        lights: of KHR_lights_punctual, with their transform (4, 4).
+        lights: lights of KHR_lights_punctual, with their transform (4, 4).
     """
 
     json: dict[str, Any]

@@ -21,14 +21,14 @@ from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.math.daubechies import analysis
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.methods.store_layout import read_lights
 from relume.operators.edit_basis import CurveBasis, precompute
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table

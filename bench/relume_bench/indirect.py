@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import pack_reflectance, scatters_diffusely
+from relume.brdf.albedo import Reflectance, material_reflectance, scatters_diffusely
 from relume.brdf.texture_slots import NormalMap
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.look import validate
@@ -31,7 +31,7 @@ def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[
     """Indirect light of an image. (height, width, 3)
 
     Args:
-        transfer: the bake. terms: of materials that differ from the scene's default look.
+        transfer: the bake. terms: terms of materials that differ from the scene's default look.
     """
     document = copy.deepcopy(transfer.default_look)
     for name, material_terms in terms.items():
@@ -48,10 +48,10 @@ def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[
 def ignore_glossy_reflection() -> Iterator[None]:
     """Restrict relume's indirect light to diffuse terms, for peers with the same restriction."""
 
-    def key_of_diffuse_terms(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None) -> bytes:
-        return pack_reflectance(list(filter(scatters_diffusely, terms)), normals)
+    def reflectance_of_diffuse_terms(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None) -> Reflectance:
+        return material_reflectance(list(filter(scatters_diffusely, terms)), normals)
 
-    with patch("relume.live.fixed_camera.illumination.pack_reflectance", key_of_diffuse_terms):
+    with patch("relume.live.fixed_camera.illumination.material_reflectance", reflectance_of_diffuse_terms):
         yield
 
 

@@ -13,21 +13,20 @@ import copy
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from relume.assets.environments.studio import studio
 from relume.core.cache import Cache
-from relume.live.fixed_camera.jobs import PrecomputeOperator
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.operators.linear_operator import operator_bytes
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.scenes import cook_torrance, teapot_on_table
@@ -90,11 +89,12 @@ def _measure_edits(transfer: FixedViewTransfer, looks: list[Look], budget_bytes:
     picture = _open_exact(transfer, looks[0], cache)
     picture.prepare(_ACTIVE_POINTER)
     job = picture.next_job()
-    assert isinstance(job, PrecomputeOperator)
+    assert job is not None
+    assert job.kind == "operator"
     start_time = time.perf_counter()
     result = job.run(lambda share: None, lambda: False)
     freeze_s = time.perf_counter() - start_time
-    picture.install(job, result)
+    job.apply(result)
     durations = []
     for look in looks[1:]:
         start_time = time.perf_counter()
@@ -105,7 +105,7 @@ def _measure_edits(transfer: FixedViewTransfer, looks: list[Look], budget_bytes:
         "ms": 1e3 * float(np.median(durations)),
         "freeze_s": freeze_s,
         "error": relative_rmse(picture.image(), last),
-        "step": job.form.step,
+        "step": cast("Any", job.run).__self__.form.step,
         "bytes": result.num_bytes,
     }
 

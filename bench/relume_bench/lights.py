@@ -22,14 +22,15 @@ from relume.core.cache import Cache
 from relume.lights.local_lights import rectangle
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Scene
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure, skipped
 from relume_bench.indirect import PASSES
 from relume_bench.mitsuba import bsdf, missing, read_passes, render

@@ -129,7 +129,7 @@ def render_arrays(
 
     Args:
         arrays: "positions_k", "normals_k", "uvs_k" and "faces_k" of each surface, and arrays for descriptions.
-        scene: of camera and environment.
+        scene: scene with the camera and the environment.
         size, job, folder: as for `render`.
     """
     camera, llvm = scene.cameras[0], _llvm()

@@ -27,15 +27,14 @@ from relume.core.cache import Cache
 from relume.core.thread_pools import num_threads
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.scene.examples.still_life import demo_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import BakeMethod, Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.timing import seconds
 
@@ -108,7 +107,7 @@ def _measure_waits(method: BakeMethod, size: tuple[int, int], num_lights: int) -
             _run_next_job(picture)
         picture.encode(picture.all_tiles(), "rgb9e5")
         first_s = time.perf_counter() - start_time
-        while isinstance(picture.next_job(), SparsePreview):
+        while (job := picture.next_job()) is not None and job.kind == "preview":
             _run_next_job(picture)
             picture.advance(None)
         picture.encode(picture.all_tiles(), "rgb9e5")

@@ -85,7 +85,7 @@ def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
 
     Args:
         folder: for the image file.
-        spp: samples per pixel. seed: of the samples.
+        spp: samples per pixel. seed: seed of the samples.
     Returns:
         The image, (height, width, 3) float64, and its seconds.
     """

@@ -21,8 +21,8 @@ import numpy as np
 from relume.core.cache import Cache
 from relume.core.jackknife import JackknifeEstimate
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look.document import MAX_BOUNCES
-from relume.methods.registry import open_transfer
 from relume.scene.examples.cornell import GLOSSY_FLOOR, cornell_box
 from relume.scene.model import Scene
 from relume_bench import cycles, mitsuba

@@ -24,13 +24,13 @@ from relume.brdf.term_validation import complete_term
 from relume.core.cache import Cache
 from relume.core.jackknife import JackknifeEstimate
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.reference import environment_texels, reference_radiance
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure, skipped
 from relume_bench.mitsuba import bsdf, missing, render
 from relume_bench.points import frame_radiance, sample_lit_surface

@@ -183,7 +183,7 @@ class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
         """Mitsuba's interface.
 
         Args:
-            scene: for the rest of the path. sampler: of random numbers.
+            scene: for the rest of the path. sampler: sampler of random numbers.
             ray: from the camera. medium: always None, there are none.
             active: active lanes.
         Returns:

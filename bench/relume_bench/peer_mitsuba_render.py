@@ -26,7 +26,7 @@ def resolve_description(arrays: Any, value: Any) -> Any:
     """Resolve the images of a description.
 
     Args:
-        arrays: of scene.npz.
+        arrays: arrays of scene.npz.
         value: {"array": name} becomes a texture of that array, (height, width, 1 or 3), with raw values; optional
             "wrap_mode" and "filter_type".
     """
@@ -42,7 +42,7 @@ def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
     """Create one mesh of the scene.
 
     Args:
-        arrays: of scene.npz. k: index of the mesh; "NAME_of_k" in the arrays are attributes of its vertices.
+        arrays: arrays of scene.npz. k: index of the mesh; "NAME_of_k" in the arrays are attributes of its vertices.
         bsdf: its material, as from `relume_bench.mitsuba.bsdf`; "interior" is the medium inside, "emitter" its
             emission. Without dielectric and "sides" it is made two-sided.
     """
@@ -80,7 +80,8 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
     center, Mitsuba's +Z.
 
     Args:
-        folder: of scene.npz. job: of job.json: size, camera, emitters, integrator, by default of direct light.
+        folder: folder of scene.npz.
+        job: content of job.json: size, camera, emitters, integrator, by default of direct light.
         bsdfs: descriptions, one per mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)

@@ -17,8 +17,8 @@ from relume.methods.registry import METHODS
 from relume.scene.examples.catalog import BUILT_IN
 from relume.scene.model import Scene
 from relume.scene_io.import_scene import import_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure, skipped
 from relume_bench.scenes import shared_data
 

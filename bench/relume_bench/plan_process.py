@@ -17,9 +17,10 @@ import distributed.worker  # noqa: F401  a worker process holds it too
 
 from relume.methods.registry import METHODS
 from relume.scene.scene_folder import load_scene
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import Task, TaskOutput
 from relume.store.publish import array_paths
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_worker.status import FREE_CAMERA_METHODS, recipe_from_json
 
 

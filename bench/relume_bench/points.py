@@ -42,9 +42,9 @@ def sample_lit_surface(
 
     Args:
         scene: its first view is used. size: width and height, pixels.
-        num_positions: of the subset; all if there are fewer.
+        num_positions: number of positions of the subset; all if there are fewer.
         num_lights: minimum number of environment triangles.
-        material: of the samples; None for all materials.
+        material: material of the samples; None for all materials.
     """
     geometry = build_scene_buffers(scene)
     camera = scene.cameras[0]

@@ -17,12 +17,12 @@ import numpy as np
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.scene.examples.still_life import demo_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.timing import seconds

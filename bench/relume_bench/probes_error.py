@@ -20,7 +20,7 @@ from relume.assets.environments.equirect import texel_directions, texel_solid_an
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.view_images import material_documents
 from relume.live.free_camera.basis.material_tables import build_tables
-from relume.live.free_camera.probe_light.incident import combine_all
+from relume.live.free_camera.incident_light import combine_all
 from relume.live.free_camera.shade_probes import shade_probes
 from relume.look import Look
 from relume.raytrace.camera_rays import trace_rays
@@ -95,7 +95,7 @@ def measure_radiance_rmse(
     """Radiance of some probes toward the camera by all paths, against path tracing; for a look with broad terms.
 
     Args:
-        scene: without textures. num: visible probes. num_paths: per probe. change: of its look.
+        scene: without textures. num: visible probes. num_paths: per probe. change: change of its look.
     """
     look, free_camera_bake, camera_position = (
         scene.look(change),
@@ -106,6 +106,7 @@ def measure_radiance_rmse(
     probe_indices = visible_probes[np.linspace(0, len(visible_probes) - 1, num).astype(np.int64)]
     is_needed = np.zeros(free_camera_bake.stored_scene.probes.num_points, np.uint8)
     is_needed[probe_indices] = 1
+    viewed = free_camera_bake.stored_scene.viewed_from(camera_position, is_needed)
     incident = combine_all(
         free_camera_bake, illumination_from_look(look, free_camera_bake.material_names, has_bounces=True)
     )
@@ -113,11 +114,7 @@ def measure_radiance_rmse(
     # all light that the hemispherical basis represents
     highlight_tables = tables._replace(table_index=tables.table_index[..., [2, 3, 4, 5, 4, 5]])
     radiance = sum(
-        shade_probes(
-            free_camera_bake.stored_scene, incident.total, None, table, camera_position.astype(np.float32), is_needed
-        )
-        .radiance[probe_indices]
-        .sum(axis=1)
+        shade_probes(viewed, incident.total, None, table).radiance[probe_indices].sum(axis=1)
         for table in (tables, highlight_tables)
     )
     reference_passes = _trace_paths(scene, look, probe_indices, num_paths)

@@ -23,17 +23,17 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refine_job import RefineHighlights
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake, open_transfer
 from relume.look import Look, complete, validate
 from relume.look.document import MAX_BOUNCES
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.catalog import built_in
 from relume.scene.examples.cornell import sunny_environment
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure, skipped
 from relume_bench.indirect import PASSES
 from relume_bench.mitsuba import bsdf, missing, read_passes, render
@@ -90,8 +90,8 @@ def _while_it_moves(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.
     picture = FreeCameraPicture(bake, view, is_watched=True)
     picture.set_look(look)
     picture.advance(None)
-    while (job := picture.next_job()) is not None and not isinstance(job, RefineHighlights):
-        picture.install(job, job.run(lambda share: None, lambda: False))
+    while (job := picture.next_job()) is not None and job.kind != "highlights":
+        job.apply(job.run(lambda share: None, lambda: False))
         picture.advance(None)
     return picture.image()
 

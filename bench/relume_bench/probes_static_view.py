@@ -23,17 +23,19 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.core.thread_pools import num_threads
+from relume.live.fixed_camera.jobs import Job
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
-from relume.live.free_camera.refinement.refinement_jobs import TRACING_FRACTION, SparseExactJob, StaticViewJob
+from relume.live.free_camera.progressive_picture import ProgressivePicture
+from relume.live.free_camera.static_view_jobs import TRACING_FRACTION
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake
+from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import complete, validate
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake
-from relume.methods.static_view import StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.scene.examples.catalog import built_in
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 
 _CACHE_BYTES = 4 << 30
@@ -117,14 +119,14 @@ def _measure_convergence(scene: Scene, picture: ProgressivePicture, step: int, s
     while (job := picture.next_job()) is not None:
         job_began = time.perf_counter()
 
-        def record_progress(fraction: float, job: object = job, job_began: float = job_began) -> None:
+        def record_progress(fraction: float, job: Job = job, job_began: float = job_began) -> None:
             nonlocal tracing_s
-            if fraction <= TRACING_FRACTION and isinstance(job, StaticViewJob):
+            if fraction <= TRACING_FRACTION and job.kind == "static view":
                 tracing_s = time.perf_counter() - job_began
 
-        picture.install(job, job.run(record_progress, lambda: False))
+        job.apply(job.run(record_progress, lambda: False))
         picture.advance(None)
-        if isinstance(job, SparseExactJob):
+        if job.kind == "exact samples":
             picture.encode(picture.all_tiles(), "rgb9e5")
             first, first_s = picture.image().copy(), time.perf_counter() - start_time
     picture.encode(picture.all_tiles(), "rgb9e5")

@@ -14,17 +14,18 @@ from typing import Any
 import numpy as np
 
 from relume.core.cache import Cache
+from relume.live.opened.openers import open_transfer
 from relume.look import complete, validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.methods.store_layout import read_lights, read_rays
 from relume.methods.view_stages import SampledViews
 from relume.output.render_image import render_image
 from relume.raytrace.visibility import trace_visibility
 from relume.scene.examples.still_life import demo_scene
 from relume.scene.model import Scene
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import BakeMethod, Recipe, StoreReader, Task, TaskOutput
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.scenes import LAMBERT

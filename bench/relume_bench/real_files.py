@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from relume.assets.environments.read_environment import read_environment
 from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.scene.model import Scene
 from relume.scene_io.import_scene import import_scene
@@ -93,7 +93,7 @@ def compared(name: str, tiny: bool, folder: Path | None = None) -> tuple[F64, F3
     """Our image and the peer's passes of one file, pixels on surfaces. (1, n, 3), (passes, 1, n, 3)
 
     Args:
-        name: of `FILES`. tiny: a trial run.
+        name: name in `FILES`. tiny: a trial run.
         folder: for whole images, in NAME.npz; None: not stored.
     """
     size, spp, lights = ((40, 30), 2, 60) if tiny else (_SIZE, _SPP, _LIGHTS)

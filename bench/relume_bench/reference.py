@@ -85,7 +85,7 @@ def _disagreement(
         scene: its first view is rendered by both.
         size: width and height of Mitsuba's images, pixels.
         spp: per pixel in each of Mitsuba's passes, and per view sample in ours.
-        passes: of each renderer.
+        passes: passes of each renderer.
     """
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     with tempfile.TemporaryDirectory() as folder:

@@ -13,6 +13,7 @@ from datetime import date
 from typing import Any
 
 from relume.store.schema import SCHEMA_VERSION
+from relume_bench.check import HEAD, Verdict, judge, line, stored_figures
 from relume_bench.figure import Figure
 from relume_bench.machine import measure_stolen_fraction, processor_ticks
 
@@ -22,14 +23,19 @@ class Group:
     """Figures that are measured together, by `measure(tiny)` of a module.
 
     Attributes:
-        tiny: of `measure`: meaningless sizes that take seconds, for the tests.
+        is_quick: `make test` checks them: accuracy without files or programs of others, in seconds.
     """
 
     module: str
     names: tuple[str, ...]
+    is_quick: bool = False
 
     def measure(self, tiny: bool) -> list[Figure]:
-        """Measure; a failure becomes a figure without a value."""
+        """Measure; a failure becomes a figure without a value.
+
+        Args:
+            tiny: meaningless sizes that take seconds, for the tests.
+        """
         start_time, ticks = time.perf_counter(), processor_ticks()
         try:
             figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
@@ -72,6 +78,15 @@ GROUPS = (
     Group("relume_bench.sharp_slider", ("slider.sharp_error", "slider.sharp_levels")),
     Group("relume_bench.accuracy", ("accuracy.lambert", "accuracy.cook_torrance_0.2", "accuracy.cook_torrance_0.05")),
     Group(
+        "relume_bench.accuracy_generated",
+        (
+            "accuracy.generated_lambert",
+            "accuracy.generated_cook_torrance_0.2",
+            "accuracy.generated_cook_torrance_0.05",
+        ),
+        is_quick=True,
+    ),
+    Group(
         "relume_bench.accuracy_terms",
         (
             "accuracy.oren_nayar",
@@ -88,11 +103,11 @@ GROUPS = (
             "accuracy.ggx",
         ),
     ),
-    Group("relume_bench.paper_fig5", ("paper.fig5_incremental", "paper.fig5_non_linear")),
+    Group("relume_bench.paper_fig5", ("paper.fig5_incremental", "paper.fig5_non_linear"), is_quick=True),
     Group("relume_bench.reference", ("reference.mitsuba",)),
     Group("relume_bench.rotation", ("accuracy.rotation_lambert", "accuracy.rotation_cook_torrance_0.2")),
     Group("relume_bench.swap", ("accuracy.swap_lambert", "accuracy.swap_cook_torrance_0.2")),
-    Group("relume_bench.pca", ("pca.blinn_phong_6", "pca.vectors", "pca.slider_nodes")),
+    Group("relume_bench.pca", ("pca.blinn_phong_6", "pca.vectors", "pca.slider_nodes"), is_quick=True),
     Group("relume_bench.rays", ("bake.rays_vs_embreex",)),
     Group("relume_bench.bake", ("bake.wall_vs_rays", "bake.teatray_s")),
     Group("relume_bench.ray_saving", ("bake.ray_saving",)),
@@ -100,6 +115,7 @@ GROUPS = (
     Group("relume_bench.plan_disk", ("plan.disk_ratio",)),
     Group("relume_bench.plan", ("plan.memory_share", "plan.samples_share", "plan.store_share", "plan.rays_share")),
     Group("relume_bench.mesh_files", ("import.obj", "import.ply")),
+    Group("relume_bench.render_workers", ("render.two_workers_speedup",)),
     Group("relume_bench.workers", ("bake.two_workers_speedup",)),
     Group("relume_bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
     Group("relume_bench.refusal", ("import.refusal_ms",)),
@@ -210,32 +226,45 @@ def names() -> list[str]:
     return [name for group in GROUPS for name in group.names]
 
 
-def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
-    """Measure the groups with a figure whose name starts with `prefix`; yield those figures."""
+def measure(prefix: str, tiny: bool = False, *, quick: bool = False) -> Iterator[Figure]:
+    """Measure the groups with a figure whose name starts with `prefix`; yield those figures.
+
+    Args:
+        prefix: of the figures to measure; "" for all.
+        tiny: meaningless sizes that take seconds, for the tests.
+        quick: only groups that are quick.
+    """
     for group in GROUPS:
-        names = [name for name in group.names if name.startswith(prefix)]
+        names = [name for name in group.names if name.startswith(prefix) and (group.is_quick or not quick)]
         if names:
             yield from (figure for figure in group.measure(tiny) if figure.name in names)
 
 
-def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
-    """Measure and print; 1 if something failed or no figure has such a name.
+def run(prefix: str, as_json: bool, tiny: bool = False, *, quick: bool = False, check: bool = False) -> int:
+    """Measure and print; 1 if something failed, is past its target, or no figure has such a name.
 
     Args:
-        prefix: of the figures to measure; "" for all.
+        prefix: prefix of the figures to measure; "" for all.
         as_json: print a list of figures to stdout, and text to stderr.
         tiny: meaningless sizes that take seconds, for the tests.
+        quick: only groups that are quick.
+        check: print each figure's target and whether it meets it.
     """
     if not any(name.startswith(prefix) for name in names()):
         print(f"relume: no benchmark starts with {prefix!r}; choose from {', '.join(names())}", file=sys.stderr)
         return 1
-    figures = []
-    for figure in measure(prefix, tiny):
+    stored, text = stored_figures() if check else {}, sys.stderr if as_json else sys.stdout
+    if check:
+        print(HEAD, file=text, flush=True)
+    figures, is_ok = [], True
+    for figure in measure(prefix, tiny, quick=quick):
         figures.append(figure)
-        print(_line(figure), file=sys.stderr if as_json else sys.stdout, flush=True)
+        verdict = judge(figure, stored) if check else Verdict("failed" not in figure.context, "")
+        is_ok = is_ok and verdict.is_ok
+        print(line(figure, verdict) if check else _line(figure), file=text, flush=True)
     if as_json:
         print(json.dumps([_plain(asdict(figure)) for figure in figures], indent=1, allow_nan=False))
-    return 1 if any("failed" in figure.context for figure in figures) else 0
+    return 0 if figures and is_ok else 1
 
 
 def _line(figure: Figure) -> str:

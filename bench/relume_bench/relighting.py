@@ -15,7 +15,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
 from relume.core.jackknife import JackknifeEstimate
 from relume.lights.sphere_tiles import Tiles, choose_tiles
-from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.operators.shade import shade
 from relume.raytrace.visibility import trace_visibility
 from relume.reference import environment_texels, reference_radiance
@@ -54,7 +54,7 @@ def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
         tiles,
         centroids
         if relightable
-        else integrate_environment(tiles, RotatedEnvironment.from_radiance(environment.radiance)).direction,
+        else integrate_environment(tiles, EnvironmentTexels.from_radiance(environment.radiance)).direction,
     )
 
 
@@ -82,7 +82,7 @@ def compare(
     )
     errors = {}
     for kind, baked in bakes.items():
-        lights = integrate_environment(baked.tiles, RotatedEnvironment.from_radiance(light.radiance))
+        lights = integrate_environment(baked.tiles, EnvironmentTexels.from_radiance(light.radiance))
         for (name, document), right in zip(terms.items(), reference, strict=True):
             errors[name, kind] = estimate_point_error(_radiance(lit_samples, baked, lights, document), right)
     return errors

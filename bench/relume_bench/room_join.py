@@ -1,6 +1,6 @@
 """rooms.join_s: from requesting a session in a room to its first message, with queued thumbnails and a full batch.
 
-A real server on a baked scene without a thumbnail. The single batch process renders images that take longer than the
+A real server on a baked scene without a thumbnail. The worker processes render images that take longer than the
 measurement; several clients request the missing thumbnail, and wait; then a few sessions join rooms of their own, one
 after another. The figure is the longest time, `quiet_s` the same without load.
 """

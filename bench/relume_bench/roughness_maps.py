@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.scene.examples.cornell import rectangle, sunny_environment
 from relume.scene.examples.still_life.grids import sphere

@@ -37,10 +37,15 @@ def shared_data() -> Path:
 
 
 def environments() -> list[Environment]:
-    """Three real maps, or the studio and two generated ones if they are missing."""
+    """Three real maps, or the generated ones if they are missing."""
     paths = [shared_data() / "envmaps" / f"{name}.hdr" for name in REAL]
     if all(path.is_file() for path in paths):
         return [read_environment(path, path.stem) for path in paths]
+    return generated_environments()
+
+
+def generated_environments() -> list[Environment]:
+    """The studio and two environments with a sun."""
     return [
         studio(),
         *(make_sun_environment(f"{name} sun (generated)", y) for name, y in (("high", 0.8), ("low", 0.15))),
@@ -51,9 +56,9 @@ def make_sun_environment(name: str, height: float, num_rows: int = 256, spread: 
     """An environment with a sun whose radiance falls to 1/e at 1 − cos = spread, with constant power.
 
     Args:
-        name: of the environment.
-        height: of the sun; the tangent of its elevation is about 1.28 times this.
-        num_rows: of the map, which is twice as wide.
+        name: name of the environment.
+        height: height of the sun; the tangent of its elevation is about 1.28 times this.
+        num_rows: number of rows of the map, which is twice as wide.
         spread: 1 − cos of the sun's angular radius.
     """
     d = texel_directions(num_rows, 2 * num_rows)
@@ -67,7 +72,7 @@ def teapot_on_table(environment: Environment, pot: Terms, table: Terms, camera_d
     """Newell's teapot, 0.16 m high, on a table of 3 × 3 m; view "front", square images frame the pot.
 
     Args:
-        environment: of the scene.
+        environment: environment of the scene.
         pot, table: terms of the two materials, "Teapot" and "Table".
         camera_distance: 1 for a pot that covers about a third of the image.
     """

@@ -14,7 +14,7 @@ import numpy as np
 
 from relume.assets.environments.studio import studio
 from relume.core.cache import Cache
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.store.bake_protocol import Recipe
 from relume_bench.baked_server import SessionClient, baked_folder, serving, session
 from relume_bench.figure import Figure

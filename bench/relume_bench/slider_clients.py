@@ -20,7 +20,8 @@ class SliderClient:
     """Drags one slider back and forth, each edit after the frame of the one before the last.
 
     Args:
-        connection: of the session. slider: pointer to a parameter. span: range of its value. phase: starting point, in
+        connection: connection of the session. slider: pointer to a parameter. span: range of its value.
+        phase: starting point, in
             periods.
     Attributes:
         num_frames: received so far.

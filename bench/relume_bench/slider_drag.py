@@ -29,13 +29,13 @@ from relume.brdf.term_validation import complete_term
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.operators.edit_basis import precompute
 from relume.operators.parameter_operator import linearize
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import freeze_for_curve, relative_rmse, sample_lit_surface
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table

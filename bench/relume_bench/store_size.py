@@ -6,11 +6,11 @@ import tempfile
 from pathlib import Path
 
 from relume.core.cache import Cache
+from relume.live.opened.openers import open_transfer
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.scene.examples.still_life import demo_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 
 _BLOCK = 4096

@@ -23,7 +23,7 @@ def bake_s(service: BakeService, scene: str, recipe: Recipe) -> float:
     """Seconds from submitting a bake to `ready`.
 
     Args:
-        service: of the bake. scene: id of a registered one. recipe: of the bake.
+        service: service of the bake. scene: id of a registered one. recipe: recipe of the bake.
     Raises:
         PlanError: the bake has failed.
     """

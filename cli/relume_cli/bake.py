@@ -175,7 +175,7 @@ def _report(status: BakeStatus, settings: Settings, seconds: float) -> None:
 
 def _report_rays(store: Path) -> None:
     from relume.methods.store_layout import read_rays
-    from relume.store import open_store
+    from relume.store.reader import open_store
 
     rays = read_rays(open_store(store))
     note(
@@ -186,7 +186,7 @@ def _report_rays(store: Path) -> None:
 
 def _report_free_camera_error(store: Path) -> None:
     from relume.methods.store_layout import read_free_camera_error
-    from relume.store import open_store
+    from relume.store.reader import open_store
 
     free_camera_error = read_free_camera_error(open_store(store))
     if free_camera_error is not None:

@@ -15,7 +15,7 @@ def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = 
     """Show progress until the bake ends, and return its last status.
 
     Args:
-        changes: of the bake. label: of the progress. interrupted: polled; true stops.
+        changes: changes of the bake. label: label of the progress. interrupted: polled; true stops.
     Raises:
         KeyboardInterrupt: `interrupted` returned true. NotFoundError: the bake was deleted.
     """

@@ -10,6 +10,8 @@ import typer
 def bench(
     name: Annotated[str, typer.Argument(metavar="[NAME]", help="Run benchmarks whose name starts with this.")] = "",
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of name, value, unit, context.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Only the accuracy figures that take seconds.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Fail if a figure is past its target.")] = False,
 ) -> int:
     """Run the benchmarks.
 
@@ -17,5 +19,5 @@ def bench(
     """
     from relume_bench.registry import run
 
-    result = run(name, json)
+    result = run(name, json, quick=quick, check=check)
     return result if isinstance(result, int) else 0

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from relume.core.errors import NotFoundError
+from relume.core.errors import Description, NotFoundError
 from relume_cli.name_lookup import match_name
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _refuse_url() -> None:
     """Raise ParameterError: other users can read the arguments of a process, and a URL contains a password."""
     from relume.core.errors import ParameterError
 
-    raise ParameterError("--data", "a URL", "a directory; set RELUME_DATABASE to the database's URL")
+    raise ParameterError("--data", Description("a URL"), "a directory, and set RELUME_DATABASE to the database's URL")
 
 
 @contextmanager
@@ -90,7 +90,9 @@ def check_used(settings: Settings) -> None:
 
     paths = settings.data / "relume.db", *(folder for _, folder in list_asset_stores(settings.data))
     if not settings.database and not any(path.exists() for path in paths):
-        raise ParameterError("--data", str(settings.data), "a directory that relume has used; this one is empty")
+        raise ParameterError(
+            "--data", str(settings.data), "a directory that relume has used, because this one is empty"
+        )
 
 
 def find_scene(ledger: Ledger, name: str) -> SceneRecord:
@@ -114,7 +116,7 @@ def find_bake_and_view(
     """Find a finished bake by its id, the start of its id, or a scene's name.
 
     Args:
-        service: of the data directory. name: of a bake or a scene; the finest bake of a scene is taken.
+        service: service of the data directory. name: name of a bake or a scene; the finest bake of a scene is taken.
         view, is_free_camera: as for `find_bake`.
     Returns:
         The scene, the bake, and the view.
@@ -149,7 +151,8 @@ def find_bake(
     """Return the finest finished bake of a scene that has the view, and the view. Raises NotFoundError.
 
     Args:
-        service, scene: of the data directory. view: name; None: any. is_free_camera: accept free-camera bakes only.
+        service, scene: service and scene of the data directory. view: name; None: any.
+        is_free_camera: accept free-camera bakes only.
     """
     from relume_worker.status import FREE_CAMERA_METHODS
 
@@ -172,7 +175,7 @@ def complete_look(partial: dict[str, Any], default: dict[str, Any], name: str = 
     """Complete a look document with the scene's default, and validate it.
 
     Args:
-        partial, default: documents. name: of the look, in messages.
+        partial, default: documents. name: name of the look, in messages.
     Raises:
         ParameterError: with the name of the look and the JSON pointer.
     """

@@ -32,10 +32,10 @@ def demo(
     from relume.image_io.ocio.active_config import get_config
     from relume_cli.data_folder import open_settings, private_files
     from relume_server.app import serve
-    from relume_server.auth.exposure import check_openness
+    from relume_server.auth.access_check import check_access_settings
 
     settings = open_settings(data, port=port)
-    check_openness(settings)
+    check_access_settings(settings)
     check_port(settings.host, settings.port)
     get_config()  # fail early if the config is invalid
     threading.Thread(target=_bake, args=(settings, browser), name="relume-demo", daemon=True).start()

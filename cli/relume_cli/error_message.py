@@ -27,7 +27,7 @@ def error_message(error: Exception, arguments: Sequence[str] = ()) -> str:
     """Return the message of an error, in one line.
 
     Args:
-        error: of any kind. arguments: of the command; the message names its options as typed.
+        error: error of any kind. arguments: arguments of the command; the message names its options as typed.
     """
     from sqlalchemy.exc import DBAPIError
 

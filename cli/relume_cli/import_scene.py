@@ -98,10 +98,10 @@ def _read_scene(file: Path | None, environment: Path | None, name: str | None, b
 
     if built_in_name is not None:
         if any(argument is not None for argument in (file, environment, name)):
-            raise ParameterError("--built-in", built_in_name, "it alone: it has its own environment and name")
+            raise ParameterError("--built-in", built_in_name, "it alone, because it has its own environment and name")
         return built_in(match_name(built_in_name, BUILT_IN))
     if file is None:
-        raise PlanError("nothing to import; give a scene file, or --built-in NAME")
+        raise PlanError("there is nothing to import; give a scene file, or --built-in NAME")
     if environment is not None:
         check_readable("--environment", environment)
     light = None if environment is None else read_environment(environment, environment.stem)

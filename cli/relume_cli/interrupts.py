@@ -30,7 +30,8 @@ def until_interrupted(label: str, work: Callable[[Callable[[float], object], Cal
     """Do long work and show its progress.
 
     Args:
-        label: of the work. work: called with a function that reports the fraction done, and one that returns true to
+        label: label of the work.
+        work: called with a function that reports the fraction done, and one that returns true to
             stop.
     Raises:
         KeyboardInterrupt: the work was interrupted, and has stopped.

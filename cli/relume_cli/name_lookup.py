@@ -22,7 +22,7 @@ def pick(kind: str, query: str, candidates: Sequence[tuple[str, str]], remedy: s
     """Return the id that matches a query: an id, a name, the start of an id, or another spelling of a name.
 
     Args:
-        kind: of the things, in messages. query: as typed. candidates: all ids and names.
+        kind: kind of the things, in messages. query: as typed. candidates: all ids and names.
         remedy: what to do if nothing matches, in messages.
     Raises:
         NotFoundError: there is none, or more than one.

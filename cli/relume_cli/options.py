@@ -86,5 +86,5 @@ def read_json(option: str, path: Path | None) -> object:
     try:
         document: object = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ParameterError(option, source, f"a JSON document; {error}") from None
+        raise ParameterError(option, source, f"a JSON document ({error})") from None
     return document

@@ -143,9 +143,9 @@ def _open(
 ) -> RenderSource:
     """Open a bake, and note the limits of its images."""
     from relume.core.cache import Cache
-    from relume.methods.free_camera_transfer import BakedFreeCamera
-    from relume.methods.registry import open_bake
-    from relume.methods.static_view import StaticViewBuilder
+    from relume.live.opened.free_camera_transfer import BakedFreeCamera
+    from relume.live.opened.openers import open_bake
+    from relume.live.opened.static_view import StaticViewBuilder
     from relume_cli.data_folder import find_bake_and_view
     from relume_cli.pictures.write_images import RenderSource
     from relume_worker.storage import open_cached

@@ -20,12 +20,12 @@ def serve(data: Data = None, host: Host = None, port: Port = None, scheduler: Sc
     from relume.image_io.ocio.active_config import get_config
     from relume_cli.data_folder import open_settings, private_files
     from relume_server.app import serve as run_server
-    from relume_server.auth.exposure import check_openness
+    from relume_server.auth.access_check import check_access_settings
     from relume_worker.database import open_database
     from relume_worker.storage.remote import get_storage
 
     settings = open_settings(data, host=host, port=port, scheduler=scheduler)
-    check_openness(settings)
+    check_access_settings(settings)
     check_port(settings.host, settings.port)
     with private_files():
         open_database(settings.database_url).dispose()  # all three fail early if they are misconfigured

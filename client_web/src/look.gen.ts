@@ -34,7 +34,7 @@ export interface DrawnCurve {
   channels?: string;
 }
 
-/** The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counter-clockwise from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
+/** The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counterclockwise from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
 export interface EnvironmentLook {
   map: string | null;
   intensity: number;

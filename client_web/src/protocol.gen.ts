@@ -23,6 +23,9 @@ export const LUT_SIZE = 65;
 
 export const LUT_GAIN = 9;
 
+/** Worst first. */
+export const FIDELITIES: Fidelity[] = ["preview", "approximate", "incremental", "near_exact", "exact"];
+
 /** client → server: this frame was received and displayed. */
 export interface AckMessage {
   type: "ack";
@@ -497,6 +500,9 @@ export interface ExampleSceneBody {
   method: string;
 }
 
+/** Exactness of an image with respect to its look, worst first; of several images, the worst counts. - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet. - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image. - INCREMENTAL: an exact image plus the approximate change of its light, or of a curve by merged lights or a subset of the samples. - NEAR_EXACT: a sum over the few nodes of a parameter, of quantized columns, or with noticeable float32 rounding; within a thousandth (relative RMS). - EXACT: the complete sum over all light that was baked. Everything below EXACT is replaced when nobody edits. One number goes with it: the error that the replaced image had, if it was measured (`previous_error`). */
+export type Fidelity = "preview" | "approximate" | "incremental" | "near_exact" | "exact";
+
 /** Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact; `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after the camera stopped: error of the approximate image before it, relative RMS. `scene_update`: only for kind "scene_update". */
 export interface FrameHeader {
   frame: number;
@@ -508,7 +514,7 @@ export interface FrameHeader {
   tiles: [number, number, number, number][];
   format: "rgb9e5" | "jpeg" | "f32" | "r8" | "arrays";
   exact: boolean;
-  fidelity: "preview" | "approximate" | "incremental" | "near_exact" | "exact";
+  fidelity: Fidelity;
   complete: boolean;
   kind: "picture" | "highlight" | "scene_update";
   alpha: boolean;

@@ -54,7 +54,7 @@ export type {
   Turntable,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, OcioView, TransportLook as Transport } from "./look.gen";
-export { LUT_GAIN, LUT_SIZE, MAX_COMMENT, MAX_CAMERA_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VISIBLE_VIEWS, ROOM_PREFIX, SUBPROTOCOL, PROBES_LAYOUT } from "./protocol.gen";
+export { FIDELITIES, LUT_GAIN, LUT_SIZE, MAX_COMMENT, MAX_CAMERA_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VISIBLE_VIEWS, ROOM_PREFIX, SUBPROTOCOL, PROBES_LAYOUT } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];
@@ -63,7 +63,7 @@ export type Handle = [degrees: number, was: number, becomes: number];
 export type Tile = [x: number, y: number, width: number, height: number];
 export type PatchOp = gen.PatchOperation;
 
-export type Fidelity = gen.FrameHeader["fidelity"];
+export type Fidelity = gen.Fidelity;
 
 /** A partial term: omitted fields have their model's defaults. */
 export type Term = Pick<doc.TermLook, "model" | "color"> & Partial<doc.TermLook>;

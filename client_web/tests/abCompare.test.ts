@@ -36,9 +36,9 @@ test("a swap also exchanges the cameras, and a second swap restores everything",
   for (const [live, stored] of [
     [before, after],
     [after, before],
-  ]) {
+  ] as const) {
     swapWithA();
-    near(live as typeof before);
-    expect(sideA.value?.cameras.sizes).toEqual(stored?.sizes);
+    near(live);
+    expect(sideA.value.cameras.sizes).toEqual(stored.sizes);
   }
 });

@@ -18,7 +18,7 @@ export function applyPatch<T>(document: T, patch: readonly PatchOp[]): T {
       return (node as Record<string, unknown>)[key];
     }, root) as Record<string, unknown>;
     if (op !== "add" && !(last in parent)) throw new Error(`${path} does not exist`);
-    if (op === "remove") delete parent[last];
+    if (op === "remove") Reflect.deleteProperty(parent, last);
     else parent[last] = structuredClone(value);
   }
   return root as T;

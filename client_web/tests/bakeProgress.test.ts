@@ -29,7 +29,7 @@ describe("progress text of a bake", () => {
 
 test("cancel ignores a bake that has just ended, and reports other failures", async () => {
   const answers = [409, 503].map((status) => new Response(JSON.stringify({ detail: "no" }), { status }));
-  vi.stubGlobal("fetch", async () => answers.shift());
+  vi.stubGlobal("fetch", () => Promise.resolve(answers.shift()));
   await expect(cancelBake("b")).resolves.toBeUndefined();
   await expect(cancelBake("b")).rejects.toThrow("no");
   vi.unstubAllGlobals();

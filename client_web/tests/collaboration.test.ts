@@ -172,8 +172,8 @@ describe("undo", () => {
 
   const editAsOther = (path: string, value: unknown) => (look.value = lookWith(look.value as Look, path, value));
 
-  async function press(key: () => void): Promise<void> {
-    key();
+  async function press(key: () => Promise<void>): Promise<void> {
+    await key();
     await vi.waitFor(() => expect(history.targetCursor).toBe(history.cursor.value));
   }
 

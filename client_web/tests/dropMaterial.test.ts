@@ -3,7 +3,7 @@ import { expect, it, vi } from "vitest";
 import type { ImageCanvas } from "../src/render/canvas";
 
 const put = vi.hoisted(() => vi.fn());
-const state = vi.hoisted(() => ({ here: null as string | null, there: "Cone" as string | null, camera: {} as unknown }));
+const state = vi.hoisted((): { here: string | null; there: string | null; camera: object | null } => ({ here: null, there: "Cone", camera: {} }));
 vi.mock("../src/panels/library/libraryItems", () => ({ DRAG_TYPE: "material", applyEntry: put }));
 vi.mock("../src/viewport/cameras/freeCamera", () => ({ freeCameraOf: () => state.camera }));
 vi.mock("../src/render/materialPicking", () => ({ pickMaterial: () => ({ px: 3, py: 4, material: state.here }) }));

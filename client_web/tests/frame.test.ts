@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { decodeRgb9e5, encodeRgb9e5 } from "../src/render/color/rgb9e5";
 import { FrameError, parseFrame } from "../src/session/net/binaryFrame";
-import { applyFrame, brushImage, emptyPixels, normalizeWeights } from "../src/render/pixels";
+import { applyFrame, brushImage, emptyPixels, normalizeWeights, wholeImage } from "../src/render/pixels";
 
 const HEADER = {
   frame: 12,
@@ -35,6 +35,15 @@ describe("parseFrame", () => {
       expect([...frame.payload]).toEqual([...payload]);
       expect(() => applyFrame(emptyPixels(4, 3), frame)).not.toThrow();
     }
+  });
+
+  test("of one tile that covers the picture is taken over as it is, any other is not", () => {
+    const payload = Uint8Array.from({ length: 48 }, (_, i) => i);
+    const whole = parseFrame(pack({ ...HEADER, tiles: [[0, 0, 4, 3]] }, payload));
+    const copied = emptyPixels(4, 3);
+    applyFrame(copied, whole);
+    expect(wholeImage(whole)).toEqual(copied);
+    expect(wholeImage(parseFrame(pack(HEADER)))).toBeNull();
   });
 
   test("keeps the coverage of its pixels apart", () => {

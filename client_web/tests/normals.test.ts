@@ -13,7 +13,7 @@ models.value = [
 const color: Term["color"] = [1, 1, 1];
 const lambert: Term = { model: "lambert", color };
 const ggx = (roughness: number, follows?: Term["roughness_map"]): Term =>
-  ({ model: "ggx", color, params: { roughness }, ...(follows === undefined ? {} : { roughness_map: follows }) }) as Term;
+  ({ model: "ggx", color, params: { roughness }, ...(follows === undefined ? {} : { roughness_map: follows }) });
 const own: MaterialLook = { terms: [lambert, ggx(0.3), ggx(0.01), { model: "ward", color, params: { alpha: 0.2 } }] };
 
 test("bumps widen highlights that are no mirrors, as of files that have a normal map", () => {

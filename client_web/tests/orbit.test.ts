@@ -99,7 +99,7 @@ describe("pictures of where a camera is", () => {
           requests.push(size[0]);
           answers.push((picture) => (picture === null ? reject(new Error("gone")) : resolve(picture)));
         }),
-      async (picture) => void drawn.push(picture),
+      (picture) => Promise.resolve(void drawn.push(picture)),
       (error) => failed.push(error),
     );
     const settle = () => new Promise((resolve) => setTimeout(resolve));
@@ -147,9 +147,10 @@ describe("fingers", () => {
 describe("cameras that are kept", () => {
   const calls: string[] = [];
   const frame = poseOf(orbit);
-  vi.stubGlobal("fetch", async (path: string, { method = "GET" } = {}) => {
+  vi.stubGlobal("fetch", (path: string, { method = "GET" } = {}) => {
     calls.push(`${method} ${path.split("/").at(-1)}`);
-    return new Response(method === "DELETE" ? null : JSON.stringify([{ name: "A", is_placed: true }, { name: "B", is_placed: true }, { name: "Own", is_placed: false }]), { status: method === "DELETE" ? 204 : 200 });
+    const cameras = [{ name: "A", is_placed: true }, { name: "B", is_placed: true }, { name: "Own", is_placed: false }];
+    return Promise.resolve(method === "DELETE" ? new Response(null, { status: 204 }) : Response.json(cameras));
   });
 
   it("leave their old name behind, and take nobody else's", async () => {

@@ -14,7 +14,7 @@ let version = 0;
 function answer(path: string, init: RequestInit = {}): Response {
   if (init.method !== "PUT") return Response.json([]);
   if (!path.endsWith("/thumbnail")) return Response.json({ created: "1" }, { headers: { etag: `"${++version}"` } });
-  sent.push((JSON.parse(String(init.body)) as { picture: string }).picture);
+  sent.push((JSON.parse(init.body as string) as { picture: string }).picture);
   return new Response(null, { status: 204 });
 }
 

@@ -72,7 +72,7 @@ test("looks come in the order in which they were saved first, with their thumbna
 test("the thumbnail of a look goes along when it is renamed, and is there when it comes back", async () => {
   const sent: string[] = [];
   vi.stubGlobal("fetch", (path: string, init: RequestInit = {}) => {
-    if (path.endsWith("/thumbnail")) sent.push(`${path} ${String(init.body)}`);
+    if (path.endsWith("/thumbnail")) sent.push(`${path} ${init.body as string}`);
     if (path.includes(".webp")) return Promise.resolve(new Response(new Uint8Array([1, 2, 3])));
     return Promise.resolve(new Response(init.method === "DELETE" ? null : saved(path), { headers: { etag: '"1"' } }));
   });

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { ModelBody } from "../src/protocol";
+import type { MaterialLook, ModelBody } from "../src/protocol";
 import { look } from "../src/state/look";
 import { models } from "../src/state/scene";
 import { curvePath, selectedCurve, selectedMaterial, selectedTerm } from "../src/state/selection";
@@ -9,7 +9,7 @@ test("no curve is open on a ground that only catches shadows, and the same one a
   models.value = [{ model: "cook_torrance", curves: [{ name: "theta_h" }] }] as unknown as ModelBody[];
   const withGround = (isCatcher: boolean) => ({
     ...LOOK,
-    materials: { ...LOOK.materials, Teapot: { ...LOOK.materials.Teapot!, shadow_catcher: isCatcher } },
+    materials: { ...LOOK.materials, Teapot: { ...(LOOK.materials.Teapot as MaterialLook), shadow_catcher: isCatcher } },
   });
   [selectedMaterial.value, selectedTerm.value, selectedCurve.value] = ["Teapot", 1, "theta_h"];
   look.value = withGround(false);

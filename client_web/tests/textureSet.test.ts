@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import { editorRejection, startPageRejection } from "../src/start/files/rejections";
 import { isTextureFile } from "../src/panels/inspector/images/importImages";
 import { planSet, setName, setMessage, withColorAndRoughness, withSet, type Slot } from "../src/panels/inspector/images/textureSet";
-import type { ImageBody, MaterialLook, ModelBody, Term } from "../src/protocol";
+import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
 const TYPES: Record<string, string> = { jpg: "image/jpeg", png: "image/png", tga: "image/x-tga" };
@@ -78,7 +78,7 @@ test("a material with a set has all of it at once", () => {
     { model: "lambert", color: [0.5, 0.2, 0.1], texture: null },
     { model: "ggx", color: [1, 1, 1], texture: null, params: { roughness: 0.2 } },
   ] as Term[];
-  const made = withSet({ terms } as MaterialLook, withColorAndRoughness(terms, set), set);
+  const made = withSet({ terms }, withColorAndRoughness(terms, set), set);
   expect(made.terms.map(({ texture }) => texture)).toEqual(["image:c", null]);
   expect(made.terms[1]).toMatchObject({ params: { roughness: 0.7 }, roughness_map: "image:r" });
   expect(made.normal_map).toEqual({ image: "image:n", scale: 1 });

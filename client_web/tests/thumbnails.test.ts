@@ -21,9 +21,9 @@ let sent: string[];
 beforeEach(() => {
   sent = [];
   vi.useFakeTimers();
-  vi.stubGlobal("window", { setTimeout: (...args: Parameters<typeof setTimeout>) => setTimeout(...args) });
+  vi.stubGlobal("window", { setTimeout: (run: () => void, ms?: number) => setTimeout(run, ms) });
   vi.stubGlobal("fetch", (path: string, init: RequestInit) => {
-    sent.push(`${init.method} ${path} ${new Headers(init.headers).get("if-match")} ${String(init.body)}`);
+    sent.push(`${init.method} ${path} ${new Headers(init.headers).get("if-match")} ${init.body as string}`);
     return Promise.resolve(new Response(null, { status: 204 }));
   });
 });

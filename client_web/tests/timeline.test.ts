@@ -34,7 +34,7 @@ let ticks: FrameRequestCallback[];
 
 beforeEach(() => {
   ticks = [];
-  vi.stubGlobal("window", { setTimeout: (run: () => void) => void run() });
+  vi.stubGlobal("window", { setTimeout: (run: () => void) => run() });
   vi.stubGlobal("requestAnimationFrame", (tick: FrameRequestCallback) => ticks.push(tick));
   vi.stubGlobal("cancelAnimationFrame", (id: number) => ticks.splice(id - 1, 1, () => undefined));
   changes = [];
@@ -47,15 +47,15 @@ beforeEach(() => {
   onLookChange((change) => changes.push(change));
 });
 
-async function press(key: () => void): Promise<void> {
-  key();
+async function press(key: () => Promise<void>): Promise<void> {
+  await key();
   await vi.waitFor(() => expect(history.targetCursor).toBe(history.cursor.value));
 }
 
 /** A timeline from dark to bright with the frames' looks and cameras from the server. */
 async function prepared(cameras: { to_world: number[]; yfov: number }[] | null = null): Promise<void> {
   const looks = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
-  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks, cameras })));
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ looks, cameras }))));
   bake.value = "b";
   timelineOpen.value = true;
   addKeyframe({ name: "Dark", look: DARK });
@@ -211,7 +211,7 @@ test("the camera moves from keyframe to keyframe and stays where playback ends",
 test("one look is enough where the environment turns, and a view that was baked from one place shows it", async () => {
   cameraPathMode.value = "environment";
   const looks = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, "/environment/rotation", k));
-  vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks, cameras: null })));
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ looks, cameras: null }))));
   bake.value = "b";
   timelineOpen.value = true;
   addKeyframe({ name: "Dark", look: LOOK });

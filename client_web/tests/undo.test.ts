@@ -23,8 +23,8 @@ beforeEach(() => {
   onLookChange((change) => changes.push(change));
 });
 
-async function press(key: () => void): Promise<void> {
-  key();
+async function press(key: () => Promise<void>): Promise<void> {
+  await key();
   await vi.waitFor(() => expect(history.targetCursor).toBe(history.cursor.value));
 }
 

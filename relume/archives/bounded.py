@@ -1,4 +1,4 @@
-"""Opens a .zip with a limit on its directory: `zipfile` reads it whole, which takes gigabytes for millions of entries.
+"""Opening of .zip files with a limit on the directory, since `zipfile` reads gigabytes for millions of entries.
 
 The records at a file's end state the directory's size, twice with ZIP64, and `zipfile` chooses between them. The limit
 is therefore on the bytes that it reads, not on the stated size.
@@ -35,7 +35,7 @@ def open_bounded(file: BinaryIO, max_directory_bytes: int) -> zipfile.ZipFile:
     Args:
         file: seekable. max_directory_bytes: limit on the directory.
     Raises:
-        LongDirectoryError: the directory exceeds it. And whatever `zipfile` raises for damaged data.
+        LongDirectoryError: the directory exceeds the limit. Errors of `zipfile` for damaged data propagate.
     """
     bounded = _BoundedFile(file, max_directory_bytes)
     archive = zipfile.ZipFile(cast(BinaryIO, bounded))

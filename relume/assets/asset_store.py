@@ -65,9 +65,9 @@ class AssetStore:
     """The store of one kind of assets.
 
     Attributes:
-        label: of the kind, in messages. prefix: of names in looks. record: name of the JSON file.
+        label: label of the kind, in messages. prefix: prefix of names in looks. record: name of the JSON file.
         problem: raised if an asset is damaged or the store is full.
-        max_entries: of a folder.
+        max_entries: maximum number of entries of a folder.
     """
 
     label: str
@@ -99,7 +99,7 @@ class AssetStore:
         """Store an asset under the hash of its file, and return its id; an existing asset gets the new name.
 
         Args:
-            folder: of the store. source: the file.
+            folder: folder of the store. source: the file.
             name: shown to users.
             fill: writes the kind's files into an empty folder, and returns the kind's fields of the record.
         Raises:
@@ -118,7 +118,7 @@ class AssetStore:
         """Move an asset from a staging folder on the same disk into the store; an existing asset gets its name.
 
         Args:
-            folder: of the store. staged_folder: the asset's own folder.
+            folder: folder of the store. staged_folder: the asset's own folder.
         Raises:
             self.problem: the store is full, the asset is damaged, or the id belongs to another file.
         """
@@ -162,7 +162,7 @@ class AssetStore:
         """Records of all assets in a folder, newest first; damaged ones are logged and skipped.
 
         Args:
-            folder: of the store. read: returns a record by folder and id.
+            folder: folder of the store. read: returns a record by folder and id.
         """
         records = []
         for path in self.paths(folder):

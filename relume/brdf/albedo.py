@@ -9,8 +9,8 @@ for their cosine and sine parts; for other terms F is the mean over rotations ab
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -19,18 +19,17 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.registry import TERMS
 from relume.brdf.specular import specular_albedo
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
 from relume.brdf.texture_slots import TEXTURES, Images, NormalMap, texture_slot, user_images
-from relume.math.zernike import OUTGOING_DEGREE, project, recurrence
+from relume.core.digest import digest
+from relume.math.zernike import OUTGOING_DEGREE, basis_functions, recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-
-Reflectances = tuple[bytes, ...]
-"""One per material, from `pack_reflectance`; bytes, because every frame compares and hashes them."""
 
 
 def _pairs() -> tuple[tuple[int, int], ...]:
@@ -41,11 +40,10 @@ def _pairs() -> tuple[tuple[int, int], ...]:
 PAIRS = _pairs()
 """Rows j ≤ k of the recurrence table with equal order: the entries of F that are stored; the first is F_00."""
 
-_REFLECTANCE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # quantization steps of a highlight's F, from 0 to 1
-_STEPS_PER_OCTAVE = 64  # quantization steps of a sharp highlight's parameters
+_STEPS_PER_OCTAVE = 64  # quantization steps per octave of a sharp highlight's parameters
 # least F_00 of a highlight that matters; least F_66 / F_00 of a highlight that the basis does not represent
 _MIN_REFLECTANCE, _MIN_RESIDUAL_RATIO = 0.15, 0.03
 _LAST_PAIR = PAIRS.index((OUTGOING_DEGREE // 2, OUTGOING_DEGREE // 2))  # both of the highest degree, of order 0
@@ -56,36 +54,67 @@ def scatters_diffusely(term_document: Mapping[str, Any]) -> bool:
     return TERMS[term_document["model"]].scatters_diffusely
 
 
-def pack_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None = None) -> bytes:
-    """Pack a material's F, summed over terms per texture slot, its image names, mirrors, narrow lobes and normal map.
+Documents = tuple[Mapping[str, Any], ...]
+"""Terms of a complete look."""
+
+
+@dataclass(frozen=True)
+class Reflectance:
+    """Reflectance of a material for indirect light; hashable, because every frame compares lights.
+
+    Attributes:
+        matrix: F of the terms without a texture, then of those with each of `TEXTURES`.
+        images: that a look uses instead of each of the material's `TEXTURES`.
+        mirrors: terms that are at least partly mirrors. lobes: highlights that the basis does not represent.
+        normals: the image that a look uses instead of the material's normal map.
+        digest: of all others; two materials with equal digests are equal.
+    """
+
+    matrix: Shaped[F32, "slots 3 pairs"] = field(compare=False, repr=False)
+    images: Images = field(compare=False, repr=False)
+    mirrors: Documents = field(compare=False, repr=False)
+    lobes: Documents = field(compare=False, repr=False)
+    normals: NormalMap | None = field(compare=False, repr=False)
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        content = self.matrix.tobytes(), self.images, self.mirrors, self.lobes, self.normals
+        object.__setattr__(self, "digest", digest(content))
+
+    @property
+    def planar_mirrors(self) -> Documents:
+        """Terms that mirror like planes: none with a normal map."""
+        return () if self.normals else self.mirrors
+
+    def with_baked_normals(self) -> Reflectance:
+        """Return the same without the look's normal map."""
+        return replace(self, normals=None) if self.normals else self
+
+
+Reflectances = tuple[Reflectance, ...]
+"""One per material."""
+
+
+def material_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None = None) -> Reflectance:
+    """Return the reflectance of a material, summed over its terms.
 
     Args:
         terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
-    Returns:
-        Bytes for `unpack_reflectance`, `unpack_images`, `unpack_mirrors`, `unpack_lobes` and `unpack_normal_map`.
     """
-    return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True), normals)
+    return _sum_reflectance(tuple(map(FrozenTerm.from_document, terms)), normals)
 
 
 @lru_cache(maxsize=256)
-def _reflectances(terms_text: str, normals: NormalMap | None) -> bytes:
-    total = np.zeros((1 + len(TEXTURES), 3, len(PAIRS)))
-    terms = json.loads(terms_text)
+def _sum_reflectance(frozen_terms: tuple[FrozenTerm, ...], normals: NormalMap | None) -> Reflectance:
+    total, terms = np.zeros((1 + len(TEXTURES), 3, len(PAIRS))), [term.document for term in frozen_terms]
     highlights = [term for term in terms if not scatters_diffusely(term)]
     lobes = narrow_lobes(highlights)
     for term in filter(scatters_diffusely, terms):
         total[texture_slot(term)] += reflectance_matrix(term)
     for term in lobes or highlights:
         total[texture_slot(term)] += quantized_reflectance(term)
-    image_names = [name or "" for name in user_images(terms)]
     mirrors = [_quantize_parameters(term) for term in highlights if specular_albedo(term).any()]
-    return total.astype(np.float32).tobytes() + _pack_text(image_names, mirrors, lobes, list(normals or ()))
-
-
-def _pack_text(*sections: Sequence[Any]) -> bytes:
-    """Encode image names, then all other sections as JSON if any is not empty."""
-    image_names, *extras = sections
-    return " ".join([*image_names, json.dumps(extras, sort_keys=True)] if any(extras) else image_names).encode()
+    return Reflectance(total.astype(np.float32), user_images(terms), tuple(mirrors), tuple(lobes), normals)
 
 
 def quantized_reflectance(term: Mapping[str, Any]) -> Shaped[F64, "3 pairs"]:
@@ -101,7 +130,7 @@ def narrow_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]
     Args:
         highlights: terms of a complete look.
     Returns:
-        Their documents, for `relume.brdf.highlight_tables`; empty if the basis suffices.
+        Documents of the highlights, for `relume.brdf.highlight_tables`; empty if the basis suffices.
     """
     if any(map(_is_textured, highlights)) or not any(map(_is_narrow, highlights)):
         return []
@@ -123,57 +152,12 @@ def _quantize_parameters(term: Mapping[str, Any]) -> dict[str, Any]:
     """Round a term's numbers to powers of 2^(1/64), so that tiny edits recompute no light."""
 
     def rounded(value: Any) -> Any:
-        if isinstance(value, list):
+        if isinstance(value, list | tuple):
             return [rounded(item) for item in value]
         return float(2 ** (round(np.log2(value) * _STEPS_PER_OCTAVE) / _STEPS_PER_OCTAVE)) if value > 0 else value
 
     params = {name: rounded(value) for name, value in (term.get("params") or {}).items()}
     return {**term, "color": rounded(list(term["color"])), "params": params}
-
-
-def unpack_reflectance(packed_material: bytes) -> Shaped[F32, "slots 3 pairs"]:
-    """F of a material's terms without a texture, then of the terms with each of `TEXTURES`."""
-    return np.frombuffer(packed_material[:_REFLECTANCE_BYTES], np.float32).reshape(1 + len(TEXTURES), 3, len(PAIRS))
-
-
-def unpack_images(packed_material: bytes) -> Images:
-    """Images that a look uses instead of each of a material's `TEXTURES`. packed_material: from `pack_reflectance`"""
-    (diffuse, specular), *_ = _unpack_text(packed_material)
-    return diffuse or None, specular or None
-
-
-def unpack_mirrors(packed_material: bytes) -> list[dict[str, Any]]:
-    """Planar mirror terms of a material; empty with a normal map. packed_material: from `pack_reflectance`"""
-    _, mirrors, _, normals = _unpack_text(packed_material)
-    return [] if normals else mirrors
-
-
-def unpack_lobes(packed_material: bytes) -> list[dict[str, Any]]:
-    """Highlights that the basis does not represent; see `narrow_lobes`. packed_material: from `pack_reflectance`"""
-    return _unpack_text(packed_material)[2]
-
-
-def unpack_normal_map(packed_material: bytes) -> NormalMap | None:
-    """Image that a look uses instead of a material's normal map. packed_material: from `pack_reflectance`"""
-    normal_map = _unpack_text(packed_material)[3]
-    return NormalMap(*normal_map) if normal_map else None
-
-
-def drop_normal_map(packed_material: bytes) -> bytes:
-    """Remove the look's normal map, so that the material uses the baked one. packed_material: likewise"""
-    image_names, mirrors, lobes, normals = _unpack_text(packed_material)
-    return (
-        packed_material[:_REFLECTANCE_BYTES] + _pack_text(image_names, mirrors, lobes, [])
-        if normals
-        else packed_material
-    )
-
-
-def _unpack_text(packed_material: bytes) -> tuple[list[str], list[dict[str, Any]], list[dict[str, Any]], list[Any]]:
-    """Decode the output of `_pack_text`."""
-    diffuse, specular, *extras = packed_material[_REFLECTANCE_BYTES:].decode().split(" ", 2)
-    mirrors, lobes, normals = json.loads(extras[0]) if extras else ([], [], [])
-    return [diffuse, specular], mirrors, lobes, normals
 
 
 def reflectance(term_document: Mapping[str, Any]) -> Shaped[F64, " 3"]:
@@ -183,30 +167,28 @@ def reflectance(term_document: Mapping[str, Any]) -> Shaped[F64, " 3"]:
 
 def reflectance_matrix(term_document: Mapping[str, Any]) -> Shaped[F64, "3 pairs"]:
     """F of a term of a complete look, with its color but without its texture; F_00 alone for a diffuse term."""
-    white_matrix = (_diffuse_matrix if scatters_diffusely(term_document) else _lobe_matrix)(
-        white_material_key(term_document)
-    )
-    return white_matrix * np.asarray(term_document["color"], np.float64)[:, None]
+    compute = _diffuse_matrix if scatters_diffusely(term_document) else _lobe_matrix
+    return compute(white_term(term_document)) * np.asarray(term_document["color"], np.float64)[:, None]
 
 
-def white_material_key(term_document: Mapping[str, Any]) -> str:
-    """JSON of a term with a white color, because cached results are scaled by the color later."""
-    return json.dumps({**term_document, "color": [1.0, 1.0, 1.0]}, sort_keys=True)
+def white_term(term_document: Mapping[str, Any]) -> FrozenTerm:
+    """Return a term with a white color, by which results are cached that are scaled by the color later."""
+    return FrozenTerm.from_document(term_document, color=[1.0, 1.0, 1.0])
 
 
 @lru_cache(maxsize=1024)
-def _lobe_matrix(term_text: str) -> F64:
+def _lobe_matrix(term: FrozenTerm) -> F64:
     """F of a term with a lobe: like `_diffuse_matrix`, with ωi concentrated around the mirror direction. (3, pairs)"""
-    points, projected = _mirror_quadrature(), _project_incident(term_text)
+    points, projected = _mirror_quadrature(), _project_incident(term)
     products = np.tensordot(points.h_o, projected, axes=(0, 0))  # (rows, 3, rows)
     rows, columns = np.array(PAIRS).T
     return np.asarray(products[rows, :, columns].T)
 
 
 @lru_cache(maxsize=256)
-def _project_incident(term_text: str) -> F64:
+def _project_incident(term: FrozenTerm) -> F64:
     """Radiance toward each ωo for light in each basis function, weighted as `_QuadraturePoints`. (o, 3, rows)"""
-    document, points = json.loads(term_text), _mirror_quadrature()
+    document, points = term.document, _mirror_quadrature()
     if is_isotropic(document):
         value = _quadrature().values(document)
     else:
@@ -227,14 +209,14 @@ def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[Shaped[F64, 
         a(θo) = ∫ f(ωi, ωo) cos θi dωi
 
     Args:
-        terms: of a complete look.
+        terms: terms of a complete look.
     Returns:
         θo in radians, ascending, and a(θo).
     """
     points, total = _mirror_quadrature(), np.zeros((_NUM_OUT, 3))
     for term in terms:
         # the first function is the constant 1 / √π
-        outgoing = np.sqrt(np.pi) * _project_incident(white_material_key(term))[..., 0]
+        outgoing = np.sqrt(np.pi) * _project_incident(white_term(term))[..., 0]
         total += outgoing / points.weight_o[:, None] * np.asarray(term["color"], np.float64)
     return np.arccos(points.wo[::-1, 0, 2]), total[::-1]
 
@@ -244,7 +226,7 @@ class _QuadraturePoints(NamedTuple):
 
     Attributes:
         wi, wo: local directions. (o, n, 3), (o, 1, 3)
-        h_i: basis functions of ωi, weighted. (o, n, rows). h_o: of ωo, times ∫ cos² mφ dφ. (o, rows)
+        h_i: weighted basis functions at ωi. (o, n, rows). h_o: basis functions at ωo, times ∫ cos² mφ dφ. (o, rows)
         weight_o: weights of ωo with the cosine; h_i contains them. (o,)
     """
 
@@ -275,7 +257,10 @@ def _mirror_quadrature() -> _QuadraturePoints:
     weight = (weight_o * cos_o)[:, None] * solid_angle * np.maximum(above, 0)
     table = recurrence(OUTGOING_DEGREE)
     azimuth_norm = np.where(table.order > 0, np.pi, 2 * np.pi)
-    h_i, h_o = weight[..., None] * project(wi)[..., table.cosine], azimuth_norm * project(wo[:, 0])[:, table.cosine]
+    h_i, h_o = (
+        weight[..., None] * basis_functions(wi)[..., table.cosine],
+        azimuth_norm * basis_functions(wo[:, 0])[:, table.cosine],
+    )
     return _QuadraturePoints(wi, wo, h_i, h_o, weight_o * cos_o)
 
 
@@ -289,7 +274,7 @@ _ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # f
 
 
 @lru_cache(maxsize=1024)
-def _diffuse_matrix(term_text: str) -> F64:
+def _diffuse_matrix(term: FrozenTerm) -> F64:
     """F by Gauss-Legendre quadrature over cosines; diffuse terms are smooth, or steps of drawn bands. (3, pairs)"""
     cosine, weight = _gauss(_NUM_COSINES)
     cosine_weight = weight * cosine
@@ -298,7 +283,7 @@ def _diffuse_matrix(term_text: str) -> F64:
     components = sine[:, None] * np.cos(phi), sine[:, None] * np.sin(phi), np.tile(cosine[:, None], _NUM_AZIMUTHS)
     wi = np.stack(components, axis=-1)[None]
     wo = np.stack([sine, 0 * sine, cosine], axis=-1)[:, None, None]
-    over_azimuths = eval_brdf(json.loads(term_text), wi, wo).mean(axis=2)
+    over_azimuths = eval_brdf(term.document, wi, wo).mean(axis=2)
     out = np.zeros((3, len(PAIRS)))
     # 2π for the azimuths of each direction, divided by π
     out[:, 0] = 4 * np.pi * np.einsum("o,i,oic->c", cosine_weight, cosine_weight, over_azimuths)

@@ -147,8 +147,8 @@ def compute_alpha_beta(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ign
     """γα and γβ times scales, for many directions wi and one wo, with one power: cos γα · cos γβ = cos θh.
 
     Args:
-        scale: of each angle. (2,) float32. ix, iy, iz: local wi. (n,) float32
-        ox, oy, oz: local wo, scalars. alpha, beta: output. (n,) float32
+        scale: scale of each angle. (2,) float32. ix, iy, iz: local wi. (n,) float32
+        ox, oy, oz: local wo, scalars. alpha, beta: γα and γβ, written. (n,) float32
     """
     along, across = scale[0], scale[1]
     for k in range(ix.shape[0]):

@@ -16,6 +16,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.term import Curve
+
 F64 = NDArray[np.float64]
 
 RELATIVE = ("factors", "offsets", "handles")
@@ -98,3 +100,11 @@ def _handle_edit(from_value: F64, to_value: F64, before: F64) -> tuple[F64, F64]
     gain = np.where(is_low, change / reach, np.minimum(change, 0.0) / high)
     lift = np.where(is_low, rise * np.maximum(rise - from_value, 0.0) / reach, rise)
     return gain, lift
+
+
+def drawn_curves(term_document: Mapping[str, Any], curve: Curve) -> list[dict[str, Any]]:
+    """Freehand objects of one curve; a single object becomes a list of one."""
+    drawn = (term_document.get("curves") or {}).get(curve.name)
+    if drawn is None:
+        return []
+    return drawn if isinstance(drawn, list) else [drawn]

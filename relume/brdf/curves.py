@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from scipy.interpolate import PchipInterpolator, PPoly
 
-from relume.brdf.curve_edits import curve_edit, evaluate_edit, is_relative
+from relume.brdf.curve_edits import curve_edit, drawn_curves, evaluate_edit, is_relative
 from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Curve, Params
 from relume.math.angle_bands import MAX_ANGLE, band_averages, band_edges
@@ -67,14 +67,6 @@ def generated_bands(term_document: Mapping[str, Any], curve: Curve) -> Shaped[F6
     return np.stack(
         [_generate_bands(model, curve.name, tuple(p.items())) for p in channel_params(term_document, curve)]
     )
-
-
-def drawn_curves(term_document: Mapping[str, Any], curve: Curve) -> list[dict[str, Any]]:
-    """Freehand objects of one curve; a single object becomes a list of one."""
-    drawn = (term_document.get("curves") or {}).get(curve.name)
-    if drawn is None:
-        return []
-    return drawn if isinstance(drawn, list) else [drawn]
 
 
 def _channels(drawn: Mapping[str, Any]) -> Iterator[int]:
@@ -131,7 +123,8 @@ def curve_bands(term_document: Mapping[str, Any], curve: Curve) -> Shaped[F64, "
         values = np.maximum(_base_bands(drawn, curve, bands), 0.0)
         if is_relative(drawn):
             factor, offset = curve_edit(drawn, values)
-            values = factor * values + offset
+            # blended handles that reach zero cancel up to rounding
+            values = np.maximum(factor * values + offset, 0.0)
         for channel in _channels(drawn):
             bands[channel] = values[channel]
     return bands

@@ -34,7 +34,7 @@ def angles_numpy(
     Args:
         angle: kind of angle.
         wi, wo: local frame, unit, z = normal; they broadcast.
-        axes: of the curve, see `Curve.axes`.
+        axes: axes of the curve, see `Curve.axes`.
     """
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
     half = _normalize(wi + wo)

@@ -9,7 +9,6 @@ bins suffices.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -19,6 +18,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
 from relume.math.direction_grid import NUM_DIRECTION_BINS, bin_centers, bin_index, bin_solid_angles, fine_bin_centers
@@ -32,14 +32,14 @@ _ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # f
 
 
 @lru_cache(maxsize=64)
-def lobe_table(term_text: str) -> Shaped[F32, "fine_bins 3 bins"]:
+def lobe_table(term: FrozenTerm) -> Shaped[F32, "fine_bins 3 bins"]:
     """Table T of a term, in 1/sr; for an anisotropic term the mean over rotations about the normal.
 
     Args:
-        term_text: one term of a complete look, as JSON, with a white color (`relume.brdf.albedo.white_material_key`).
+        term: of a complete look, with a white color (`relume.brdf.albedo.white_term`).
     """
-    document, pairs = json.loads(term_text), _pairs()
-    value = _values(document, pairs.quadrature)
+    pairs = _pairs()
+    value = _values(term.document, pairs.quadrature)
     table = np.empty((len(value[0]), 3, NUM_DIRECTION_BINS), np.float32)
     for channel in range(3):
         weighted = value[channel % len(value)] * pairs.weight

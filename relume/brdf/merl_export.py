@@ -32,7 +32,7 @@ def sample_terms(terms: Sequence[Mapping[str, Any]]) -> Shaped[F64, "3 90 90 180
     Nodes below the horizon and unmeasured nodes of the terms' own data are marked as not measured.
 
     Args:
-        terms: of a complete look.
+        terms: terms of a complete look.
     Returns:
         Input of `relume.assets.measured.merl.write_merl`.
     Raises:

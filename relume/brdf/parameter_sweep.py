@@ -27,7 +27,7 @@ def slider_values(parameter: Parameter, num: int, *, at_midpoints: bool = False)
     """Parameter values at equal steps of its slider.
 
     Args:
-        parameter: with its range and scale.
+        parameter: parameter with its range and scale.
         num: number of values.
         at_midpoints: use the midpoints of `num` steps instead of the ends of `num` − 1 steps.
     """

@@ -8,7 +8,6 @@ or a curve changes functions of one angle; each is evaluated once at a few thous
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_values
 from relume.brdf.evaluate import angles_numpy
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Angle
 from relume.core.numba_options import NO_REFCOUNT
@@ -52,9 +52,13 @@ class Quadrature:
         declared = TERMS[term_document["model"]]
         term, fixed = declared.normalized(term_document), declared.fixed_values(term_document)
         quotient = _quotient(self, declared.model, fixed)
-        given = json.dumps([term_document.get("params"), term_document.get("curves")], sort_keys=True)
+        curved = FrozenTerm.from_document(
+            {"model": declared.model, **dict(fixed)},
+            params=term_document.get("params"),
+            curves=term_document.get("curves"),
+        )
         active_curves = term.active_curves(term_document)
-        curves = [_curve(declared.model, fixed, curve.name, given) for curve in active_curves]
+        curves = [_curve(curved, fixed, curve.name) for curve in active_curves]
         is_gray = len(quotient) == 1 and all((curve == curve[0]).all() for curve in curves)
         num_channels = 1 if is_gray else 3
         out = np.repeat(quotient, num_channels // len(quotient), axis=0)
@@ -72,11 +76,10 @@ def _angles() -> F64:
 
 
 @lru_cache(maxsize=32)
-def _curve(model: str, fixed: Fixed, name: str, given: str) -> F64:
+def _curve(term: FrozenTerm, fixed: Fixed, name: str) -> F64:
     """Values of a term's curve at `_angles`. (3, `_STEPS` + 1)"""
-    term, (params, drawn) = TERMS[model].normalized_by(fixed), json.loads(given)
-    document = {"model": model, **dict(fixed), "params": params, "curves": drawn}
-    return np.ascontiguousarray(curve_values(document, term.curve(name), _angles()))
+    curve = TERMS[term.document["model"]].normalized_by(fixed).curve(name)
+    return np.ascontiguousarray(curve_values(term.document, curve, _angles()))
 
 
 @lru_cache(maxsize=32)

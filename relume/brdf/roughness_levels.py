@@ -26,7 +26,7 @@ class RoughnessLevels(NamedTuple):
 
     Attributes:
         ratios: roughness of each level divided by the material's; empty without a map.
-        level: of each sample, ascending.
+        level: roughness level of each sample, ascending.
     """
 
     ratios: tuple[float, ...]
@@ -60,7 +60,7 @@ def level_bands(document: Mapping[str, Any], curve: Curve, levels: RoughnessLeve
     """Bands of a curve at all roughness levels.
 
     Args:
-        document: a term of a complete look. curve: one of its model's curves. levels: of the samples.
+        document: a term of a complete look. curve: one of its model's curves. levels: levels of the samples.
     Returns:
         (L, 3, J) if the curve depends on the width, else (3, J)
     """
@@ -75,7 +75,7 @@ def level_values(
     """Evaluate a curve at the angle and the roughness level of each sample; see `relume.brdf.curves.curve_values`.
 
     Args:
-        document, curve, levels: as in `level_bands`. gamma: of each sample, radians.
+        document, curve, levels: as in `level_bands`. gamma: angle of each sample, radians.
     """
     if not _depends_on_roughness(document, curve, levels):
         return curve_values(document, curve, gamma)

@@ -16,14 +16,13 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.curves import curve_values, drawn_curves
-from relume.brdf.registry import TERMS
-from relume.brdf.roughness_levels import uses_roughness_map
+from relume.brdf.curve_edits import drawn_curves
 from relume.brdf.term import Angle
+from relume.brdf.terms.ggx import GGX
 
 F64 = NDArray[np.float64]
 
-MODEL, TEXTURE = "ggx", "specular"  # its facet distribution is normalized; terms of other models stay lobes
+MODEL, TEXTURE = GGX.model, "specular"  # its facet distribution is normalized; terms of other models stay lobes
 SHARP, SOFT = 0.04, 0.06  # roughness up to which a term is entirely a mirror, and from which it is none
 
 
@@ -34,12 +33,12 @@ def specular_threshold(model: str) -> float | None:
 
 def specular_albedo(document: Mapping[str, Any]) -> Shaped[F64, " 3"]:
     """Fraction of a term, complete or not, that is a mirror, per channel in [0, 1]; the rest is its lobe."""
-    if document["model"] != MODEL or document.get("texture") not in (TEXTURE, None) or uses_roughness_map(document):
+    if document["model"] != MODEL or document.get("texture") not in (TEXTURE, None) or document.get("roughness_map"):
         return np.zeros(3)
-    ndf_curve = next(curve for curve in TERMS[MODEL].curves if curve.angle is Angle.THETA_H)
+    ndf_curve = next(curve for curve in GGX.curves if curve.angle is Angle.THETA_H)
     if drawn_curves(document, ndf_curve):
         return np.zeros(3)
-    default = TERMS[MODEL].parameter("roughness").default
+    default = GGX.parameter("roughness").default
     roughness = (document.get("params") or {}).get("roughness", default)
     return np.asarray(np.clip((SOFT - np.broadcast_to(roughness, 3)) / (SOFT - SHARP), 0, 1), np.float64)
 
@@ -47,29 +46,6 @@ def specular_albedo(document: Mapping[str, Any]) -> Shaped[F64, " 3"]:
 def is_mirror(documents: Sequence[Mapping[str, Any]]) -> bool:
     """True if any term of a material is at least partly a mirror."""
     return any(specular_albedo(document).any() for document in documents)
-
-
-def specular_terms(
-    documents: Sequence[Mapping[str, Any]],
-    cos_theta_i: Shaped[NDArray[np.floating], " n"],
-    tint: Shaped[NDArray[Any], "n 3"],
-) -> Shaped[F64, "n 3"]:
-    """Specular reflectance of a material's mirror terms: reflected radiance per radiance from the mirror direction.
-
-    Args:
-        documents: terms of a complete look. cos_theta_i: at the hit points.
-        tint: specular texture at the hit points.
-    """
-    theta, total = np.arccos(np.clip(cos_theta_i, 0, 1).astype(np.float64)), np.zeros((len(cos_theta_i), 3))
-    for document in documents:
-        fraction = specular_albedo(document)
-        if fraction.any():
-            curves = [curve for curve in TERMS[document["model"]].curves if curve.angle is not Angle.THETA_H]
-            values = np.prod([curve_values(document, curve, theta) for curve in curves], axis=0).T
-            total += (
-                fraction * np.asarray(document["color"]) * values * (1 if document.get("texture") is None else tint)
-            )
-    return total
 
 
 def split_specular(document: Mapping[str, Any]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class Parameter:
 
     Attributes:
         unit: "" if the number has none.
-        scale: of the slider, "linear" or "log".
+        scale: scale of the slider, "linear" or "log".
         step: values are multiples of it, if given.
     """
 
@@ -114,7 +114,7 @@ class Term:
         fixed: parameters of the quotient or an angle, whatever curves read them: a change needs a new operator.
         normalize: `fixed_values` -> the fields of this declaration that they change; the declared fields hold for the
             defaults.
-        num_channels: of the quotient, 1 or 3.
+        num_channels: number of channels of the quotient, 1 or 3.
         is_lambertian: true if the quotient is constant above the horizon.
         is_steep: true if the quotient times cos θi varies with the light direction although no curve does.
         data: store of the measured data that documents must name, if any; the name is fixed too.

@@ -27,6 +27,7 @@ from relume.core.validation import (
 
 MAX_POINTS = 4096
 MAX_CURVE_VALUE = 1e6
+MIN_ANGLE_STEP = 1e-9  # degrees; the slopes of splines through nearer points overflow
 _FIELDS = ("model", "data", "color", "texture", "roughness_map", "params", "curves")
 
 
@@ -66,7 +67,7 @@ def _complete_map(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dic
         return {}
     roughness_map = given["roughness_map"]
     if term.width is None:
-        raise invalid_value(pointer, roughness_map, f"nothing: {term.model!r} has no width")
+        raise invalid_value(pointer, roughness_map, f"no roughness map, because {term.model!r} has no width")
     return {"roughness_map": check_map(pointer, roughness_map)}
 
 
@@ -75,7 +76,7 @@ def _complete_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> di
     name = given.get("data")
     if term.data is None:
         if "data" in given:
-            raise invalid_value(pointer, name, f"nothing: {term.model!r} has no data")
+            raise invalid_value(pointer, name, f"no data, because {term.model!r} has none")
         return {}
     if not isinstance(name, str) or not term.data.exists(name):
         names = names_text(term.data.list_names())
@@ -147,10 +148,12 @@ def _check_points(pointer: Pointer, points: Any, num_values: int) -> None:
     _check_values(pointer, angles, 90.0, lambda k: (k, 0))
     for column, column_values in enumerate(values, 1):
         _check_values(pointer, column_values, MAX_CURVE_VALUE, partial(_in_column, column))
-    not_after = np.diff(np.asarray(angles, np.float64)) <= 0
+    not_after = np.diff(np.asarray(angles, np.float64)) < MIN_ANGLE_STEP
     if not_after.any():
         k = int(np.argmax(not_after)) + 1
-        raise invalid_value((*pointer, k, 0), angles[k], "an angle greater than that of the previous point")
+        raise invalid_value(
+            (*pointer, k, 0), angles[k], f"an angle {MIN_ANGLE_STEP:g}° or more greater than that of the previous point"
+        )
 
 
 def _in_column(column: int, row: int) -> Pointer:

@@ -38,7 +38,7 @@ class EdgePixels:
 
     Attributes:
         is_edge: true if a pixel needs more rays than the one through its center.
-        num_single_samples: total samples of the other pixels. num_rays: rays that were traced for this.
+        num_single_samples: total samples of the other pixels. num_rays: rays traced to find edges.
     """
 
     is_edge: Shaped[NDArray[np.bool_], " pixels"]
@@ -137,7 +137,8 @@ class CameraSetup:
         """Trace and merge the rays of a tile.
 
         Args:
-            tile: of the image. is_edge: for all pixels of the image. positions: of the rays within an edge pixel.
+            tile: tile of the image. is_edge: True for edge pixels, for the whole image.
+            positions: positions of the rays within an edge pixel.
         Returns:
             Merged rays; the number of merged rays in edge pixels; the number of traced rays.
         """

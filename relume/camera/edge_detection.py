@@ -17,7 +17,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 F32 = NDArray[np.float32]
 
 COS_NORMAL_EDGE = np.cos(np.radians(4.0))  # at larger angles one sample would alias sharp reflections
-_COS_CREASE = np.cos(np.radians(20.0))  # a crease
+_COS_CREASE = np.cos(np.radians(20.0))
 _DEPTH_EDGE = 0.02  # distance off the neighbor's plane, relative to the ray length
 NO_RAY_KEY = -2  # the key of pixels without a ray in a layer
 _RADIANCE_EDGE_FACTOR = 1.0  # relative to the mean radiance; smaller steps are left to texture filtering
@@ -28,7 +28,8 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
     """Find pixels that differ from a neighbor, and the least cosine between each pixel's normal and its neighbors'.
 
     Args:
-        key: surface that is hit, `NO_RAY_KEY` without a ray. normal, distance: of the hits. directions: of the rays.
+        key: surface that is hit, `NO_RAY_KEY` without a ray. normal, distance: normals and distances of the hits.
+        directions: directions of the rays.
             All are (height, width, …).
     Returns:
         (height, width) both
@@ -59,8 +60,9 @@ def is_depth_edge(
     """True if a neighboring ray's hit is off the plane of a hit by more than a small fraction of the distance.
 
     Args:
-        normal, distance, direction: of a hit, and of its ray. (…, 3), (…), (…, 3)
-        neighbor_distance, neighbor_direction: of the other hit, and of its ray, with the same origin. (…), (…, 3)
+        normal, distance, direction: normal and distance of a hit, and direction of its ray. (…, 3), (…), (…, 3)
+        neighbor_distance, neighbor_direction: distance of the other hit, and direction of its ray, which has the same
+            origin. (…), (…, 3)
     """
     with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
         slope = np.vecdot(direction, normal) / np.vecdot(neighbor_direction, normal)
@@ -72,7 +74,7 @@ def is_normal_edge(cosine: Shaped[F32, " pixels"]) -> Shaped[NDArray[np.bool_], 
     """True for pixels whose normals change enough for reflections to alias, at most a sixth of all pixels.
 
     Args:
-        cosine: of all pixels of an image, from `find_edge_pixels`.
+        cosine: least cosine between normals at each pixel of an image, from `find_edge_pixels`.
     """
     is_edge = cosine < COS_NORMAL_EDGE
     max_edges = int(_MAX_NORMAL_EDGE_FRACTION * cosine.size)
@@ -87,7 +89,8 @@ def find_edge_pixels(
     """Find edge pixels in a layer.
 
     Args:
-        geometry: the triangles. layer: of one ray through the center of each pixel. size: width and height in pixels.
+        geometry: the triangles. layer: layer of one ray through the center of each pixel.
+        size: width and height in pixels.
     Returns:
         True for edge pixels; for the others the least cosine between the normals of a pixel and its neighbors, 1 for
         edges and the background.
@@ -121,7 +124,7 @@ def is_radiance_edge(
     """True for pixels where the environment in a mirror has the edge of a bright region.
 
     Args:
-        layer: of one ray through the center of each pixel. environment: its radiance.
+        layer: layer of one ray through the center of each pixel. environment: its radiance.
         threshold: from `radiance_edge_threshold`. size: width and height of the image in pixels.
     """
     width, height = size

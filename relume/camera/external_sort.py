@@ -91,7 +91,7 @@ class ExternalSort:
         """Append a chunk.
 
         Args:
-            key: of its rows, ascending. columns: the same names for all chunks. (n, …)
+            key: sort key of each row, ascending. columns: the same names for all chunks. (n, …)
         """
         first = np.flatnonzero(np.diff(key, prepend=np.int32(-1)))
         self._keys.append(key[first])

@@ -29,7 +29,7 @@ class MergedRays(NamedTuple):
     """Rays that become samples.
 
     Attributes:
-        pixel: of each ray. weight: fraction of the pixel.
+        pixel: pixel index of each ray. weight: fraction of the pixel.
         layer: hits of the rays.
     """
 
@@ -49,8 +49,8 @@ def merge_rays(
     The most central ray of each group is kept, weighted by the group's fraction of the pixel's rays.
 
     Args:
-        geometry: the triangles. layer: of the rays, grouped by pixel. pixels: pixels of the rays.
-        positions: of the rays in each pixel.
+        geometry: the triangles. layer: layer of the rays, grouped by pixel. pixels: pixels of the rays.
+        positions: positions of the rays in each pixel.
     """
     num = len(positions)
     shape, visible = (len(pixels), num), layer.visible
@@ -111,7 +111,7 @@ def _central_position(
 
     Args:
         is_member: positions in each group. (groups, n). size: number of members. (groups,)
-        positions: of all rays of a pixel. (n, 2)
+        positions: positions of all rays of a pixel. (n, 2)
     """
     mean = is_member @ positions / size[:, None]
     squared_distance = np.sum((positions - mean[:, None]) ** 2, axis=-1)

@@ -34,7 +34,7 @@ _PLANE_TOLERANCE = 8  # times the ray offset: points within this distance lie in
 _RAYS_PER_BATCH = 1 << 18
 
 
-class FlatMirrors(NamedTuple):
+class PlanarMirrors(NamedTuple):
     """Planes of mirrors, the largest first.
 
     Attributes:
@@ -75,7 +75,7 @@ class FlatMirrors(NamedTuple):
         return plane_index
 
 
-def has_flat_mirrors(scene: Scene) -> bool:
+def has_planar_mirrors(scene: Scene) -> bool:
     """True if any mesh has a mirror material without a normal map."""
     return bool(_is_planar_mirror(scene)[[mesh.material for mesh in scene.meshes]].any())
 
@@ -87,7 +87,7 @@ def _is_planar_mirror(scene: Scene) -> NDArray[np.bool_]:
     )
 
 
-def find_flat_mirrors(scene: Scene, geometry: SceneBuffers) -> FlatMirrors:
+def find_planar_mirrors(scene: Scene, geometry: SceneBuffers) -> PlanarMirrors:
     """Find the planes of a scene's mirrors. geometry: its triangles"""
     face = np.flatnonzero(_is_planar_mirror(scene)[geometry.face_material])
     normal, corners = geometry.face_normals[face], geometry.faces[face]
@@ -96,7 +96,7 @@ def find_flat_mirrors(scene: Scene, geometry: SceneBuffers) -> FlatMirrors:
     corner_positions, face_material = geometry.positions[corners].astype(np.float64), geometry.face_material[face]
     area = geometry.face_areas[face]
     min_area = _MIN_RELATIVE_AREA * float(np.square(np.ptp(geometry.positions, axis=0)).sum())
-    planes, is_unassigned = list[FlatMirrors](), np.ones(len(face), np.bool_)
+    planes, is_unassigned = list[PlanarMirrors](), np.ones(len(face), np.bool_)
     for group in _group_by_plane(normal, corner_positions, face_material, area, min_area):
         if len(planes) == MAX_PLANES:
             break
@@ -119,7 +119,7 @@ def find_flat_mirrors(scene: Scene, geometry: SceneBuffers) -> FlatMirrors:
 
     plane_material = np.array([plane.material[0] for plane in planes], np.uint16)
     fields = concatenate("normal", 3), concatenate("offset"), plane_material, concatenate("axes", 2, 3)
-    return FlatMirrors(*fields, concatenate("low", 2), concatenate("high", 2))
+    return PlanarMirrors(*fields, concatenate("low", 2), concatenate("high", 2))
 
 
 def _group_by_plane(
@@ -138,16 +138,16 @@ def _group_by_plane(
         yield np.flatnonzero(group.ravel() == group_index)
 
 
-def _plane_of_triangle(normal: F32, corners: F64, material: int) -> FlatMirrors:
+def _plane_of_triangle(normal: F32, corners: F64, material: int) -> PlanarMirrors:
     """Make the plane of one triangle, without extent. normal: (3,). corners: (3, 3)"""
     unit_normal = normal.astype(np.float64) / np.linalg.norm(normal.astype(np.float64))
     tangent = any_tangent(unit_normal[None])[0].astype(np.float64)
     axes, offset = np.stack([tangent, np.cross(unit_normal, tangent)])[None], np.array([(corners @ unit_normal).mean()])
-    return FlatMirrors(unit_normal[None], offset, np.array([material]), axes, *np.empty((2, 1, 2), np.float32))
+    return PlanarMirrors(unit_normal[None], offset, np.array([material]), axes, *np.empty((2, 1, 2), np.float32))
 
 
 def mirrored_lights(normal: Shaped[F32, "P 3"], directions: Shaped[F32, "T 3"]) -> Shaped[F32, "P T 3"]:
-    """Mirror directions to lights at planes. normal: of the planes, unit. directions: to the lights, unit"""
+    """Mirror directions to lights at planes. normal: unit normals of the planes. directions: unit, to the lights"""
     twice_cosine = 2 * normal.astype(np.float64) @ directions.T
     return np.asarray(directions[None] - twice_cosine[..., None] * normal[:, None], np.float32)
 
@@ -194,7 +194,7 @@ class ReflectedLight(NamedTuple):
 
 
 def lights_visible_in_mirrors(
-    geometry: SceneBuffers, mirrors: FlatMirrors, points: SurfacePoints, directions: Shaped[F32, "T 3"]
+    geometry: SceneBuffers, mirrors: PlanarMirrors, points: SurfacePoints, directions: Shaped[F32, "T 3"]
 ) -> ReflectedLight:
     """Find the lights that points see in planar mirrors. geometry: the scene's. directions: to the lights, unit"""
     mirrored_directions = mirrored_lights(mirrors.normal, directions)
@@ -216,7 +216,7 @@ def lights_visible_in_mirrors(
 
 def _trace_mirror_paths(
     geometry: SceneBuffers,
-    mirrors: FlatMirrors,
+    mirrors: PlanarMirrors,
     points: SurfacePoints,
     candidate: NDArray[np.intp],
     directions: F32,

@@ -17,8 +17,8 @@ class SpecularChain(NamedTuple):
     """Mirrors on the paths of rays in order from the camera, the same number for each ray.
 
     Attributes:
-        material: of each mirror, index into the scene's materials.
-        cos_theta_i: at the hit.
+        material: index of each mirror's material in the scene.
+        cos_theta_i: cos θi at the hit.
         tint: specular texture at the hit.
     """
 
@@ -48,7 +48,8 @@ class SpecularChain(NamedTuple):
         """Pad a chain to `max_mirrors` mirrors with `NO_MIRROR`.
 
         Args:
-            chain: of `num_rays` rays; None without mirrors. max_mirrors: at least the number of mirrors of the chain.
+            chain: chain of `num_rays` rays; None without mirrors.
+            max_mirrors: at least the number of mirrors of the chain.
         """
         num_missing = max_mirrors - (0 if chain is None else chain.num_mirrors)
         ones = np.ones((num_rays, num_missing), np.float32)
@@ -66,8 +67,8 @@ class RayPaths(NamedTuple):
     Attributes:
         ray: index of the camera ray, ascending.
         origins: one for all or one each. directions: unit.
-        transmittance: from the origin of the ray back to the camera.
-        length: of the path up to the origin.
+        transmittance: transmittance between the camera and the ray's origin.
+        length: length of the path up to the origin.
         num_glass: number of glass surfaces since the camera.
         chain: mirrors on the path; None without mirrors. path_key: distinguishes paths over different mirrors.
     """

@@ -65,7 +65,7 @@ def refract(
 
     Args:
         geometry: the triangles. glass: glass parameters of materials.
-        paths: of the rays. hits: of all paths. rows: paths that hit glass.
+        paths: paths of the rays. hits: hits of all paths. rows: paths that hit glass.
     Returns:
         True for hits on thin glass or the outside of a solid, and the continued paths.
     """
@@ -106,7 +106,7 @@ def dielectric(cos_theta_i: Shaped[F64, " n"], eta: Shaped[F64, " n"]) -> tuple[
     """Fresnel reflectance, unpolarized, and the cosine of refraction; 1 and 0 under total internal reflection.
 
     Args:
-        cos_theta_i: on the incident side. eta: index of refraction, incident over transmitted side.
+        cos_theta_i: cos θi on the incident side. eta: index of refraction, incident over transmitted side.
     """
     cos_theta_t = np.sqrt(np.maximum(1 - eta**2 * (1 - cos_theta_i**2), 0))
     return fresnel(cos_theta_i, 1 / eta, 0.0), cos_theta_t

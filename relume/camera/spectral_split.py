@@ -87,8 +87,8 @@ class TintedLight:
         """Find the mean tint of the light that reaches points through each group.
 
         Args:
-            position, normal: of n points, mostly ordered by neighborhood. Omitting other blocks of `POINTS_PER_BLOCK`
-                points does not change the result.
+            position, normal: positions and normals of n points, mostly ordered by neighborhood. Omitting other blocks
+                of `POINTS_PER_BLOCK` points does not change the result.
         Returns:
             Mean transmittance of light through this group and no group with a higher number, NaN if there is too
             little light; and the number of traced rays.
@@ -117,7 +117,7 @@ class TintedLight:
         return tints, sum(num_rays)
 
     def _mean_tint(self, position: F32, weight: F32) -> tuple[F32, int]:
-        """Mean tint on paths from points to lights. weight: of each light. (n, lights)"""
+        """Mean tint on paths from points to lights. weight: weight of each light. (n, lights)"""
         sums = np.cumsum(weight, axis=1, dtype=np.float64)
         steps = sums[:, -1:] * ((np.arange(_NUM_PATHS) + 0.5) / _NUM_PATHS)
         light = np.stack([(sums <= step[:, None]).sum(axis=1) for step in steps.T], axis=1)
@@ -150,7 +150,7 @@ class SplitWeights(NamedTuple):
     """Weights of split samples.
 
     Attributes:
-        alpha_sample: for their shadow rays, see `relume.raytrace.surface_points.SurfacePoints`.
+        alpha_sample: alpha samples for their shadow rays, see `relume.raytrace.surface_points.SurfacePoints`.
         num_parts: number of split samples that replace the same sample.
         channel_weights: factor per channel, times `num_parts`.
     """
@@ -164,7 +164,7 @@ class TintSplit:
     """Split samples, in order.
 
     Args:
-        tints: of the light that reaches each sample through glass, see `TintedLight.tints`. (n, groups, 3)
+        tints: tints of the light that reaches each sample through glass, see `TintedLight.tints`. (n, groups, 3)
         bounds: ascending, from 0 to n; the split samples of [bounds[i], bounds[i + 1]) stay together, so that neighbors
             of the same tint group are adjacent.
         by_channel: split by channel instead of by tint.
@@ -223,7 +223,7 @@ class SplitColumn:
     """Column of samples after splitting, read like `relume.camera.external_sort.Column`.
 
     Args:
-        name: of the column; weight, transmittance and alpha_sample change. whole: the column before splitting.
+        name: name of the column; weight, transmittance and alpha_sample change. whole: the column before splitting.
         split: the split samples.
     """
 

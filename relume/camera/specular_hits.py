@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Shaped
@@ -36,15 +35,15 @@ def reflect_rays(
     """Continue the paths of rays that hit mirrors.
 
     Args:
-        geometry: the triangles. materials: of the scene.
-        paths: of the rays. hits: of all paths. rows: paths that hit mirrors.
+        geometry: the triangles. materials: materials of the scene.
+        paths: paths of the rays. hits: hits of all paths. rows: paths that hit mirrors.
         pixel_angle: angle of a pixel, radians. num_keys: larger than any mesh index.
     Returns:
         The continued paths.
     """
     mirror_hits, directions = hits.rows(rows), paths.directions[rows]
     length = paths.length[rows] + mirror_hits.distance
-    surface = surface_at(geometry, replace(mirror_hits, distance=length), directions, materials, pixel_angle)
+    surface = surface_at(geometry, mirror_hits._replace(distance=length), directions, materials, pixel_angle)
     reflected = _reflect(surface.points.normal, directions)
     face_normal = geometry.face_normals[mirror_hits.face]
     face_normal = face_normal * -np.sign(np.einsum("nc,nc->n", face_normal, directions))[:, None]

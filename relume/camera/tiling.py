@@ -52,7 +52,7 @@ def morton(pixel: Shaped[NDArray[np.int64], " n"], width: int) -> Shaped[NDArray
     """Morton codes of pixels: interleaved bits of x and y.
 
     Args:
-        pixel: row-major indices. width: of the image.
+        pixel: row-major indices. width: width of the image.
     """
     code = np.zeros(len(pixel), np.uint64)
     x, y = (pixel % width).astype(np.uint64), (pixel // width).astype(np.uint64)

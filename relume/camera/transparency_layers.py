@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -36,10 +35,10 @@ class TransparencyLayer(NamedTuple):
     Attributes:
         ray: index of the camera ray, ascending.
         hits: hits of the rays; distances are along the whole path.
-        directions: of the last path segment, unit.
-        transmittance: from the hit back to the camera, without the reflectance of mirrors.
+        directions: directions of the last path segment, unit.
+        transmittance: transmittance between the camera and the hit, without the reflectance of mirrors.
         is_visible: the surface itself is shown; false if the path only continues there.
-        origins: of the last path segment: the camera, or the last surface that changed the direction.
+        origins: origins of the last path segment: the camera, or the last surface that changed the direction.
         chain: mirrors on the path; None without mirrors.
         is_mirrored: the surface is a mirror, and another layer has its reflection.
         key: mesh index of the hit, −1 for the background; offset to distinguish paths over different mirrors.
@@ -115,7 +114,7 @@ def trace_layers(
     """Trace camera rays through glass and off mirrors.
 
     Args:
-        geometry: the triangles. materials: of the scene. camera_position: origin of the rays.
+        geometry: the triangles. materials: materials of the scene. camera_position: origin of the rays.
         directions: unit. alpha_sample: see `trace_rays`.
         pixel_angle: angle of a pixel, radians, to filter textures on mirrors.
         traces_mirrors: add layers of reflections in mirrors.
@@ -148,7 +147,7 @@ def trace_layers(
         if len(mirror_rows) and paths.num_mirrors < MAX_MIRROR_BOUNCES and fits():
             queue.append(reflect_rays(geometry, materials, paths, hits, mirror_rows, pixel_angle, num_keys))
             is_mirrored[mirror_rows] = True
-        hits_from_camera = replace(hits, distance=hits.distance + paths.length)
+        hits_from_camera = hits._replace(distance=hits.distance + paths.length)
         key = np.where(is_hit, geometry.face_mesh[face], -1) + paths.path_key * num_keys
         origins = np.broadcast_to(paths.origins, (len(paths.ray), 3))
         layers.append(

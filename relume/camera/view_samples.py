@@ -64,13 +64,14 @@ class ViewSamples:
             radiance of the environment.
         num_rays: number of traced rays.
         level: roughness level, see `relume.scene.roughness_levels`; 0 if the material has only one.
-        transmittance: of glass between the sample and the camera. Samples on glass and behind it, on mirrors and in
-            them, have the same weight. If light reaches a sample through tinted glass, several samples replace it; they
-            share its `weight`, and this contains their channel weights (`relume.camera.spectral_split`).
+        transmittance: transmittance of glass between the sample and the camera. Samples on glass and behind it, on
+            mirrors and in them, have the same weight. If light reaches a sample through tinted glass, several samples
+            replace it; they share its `weight`, and this contains their channel weights
+            (`relume.camera.spectral_split`).
         camera: origin of the view direction: the camera, or the last surface that changed the path's direction.
         chain: mirrors on the path, padded with `NO_MIRROR`.
         is_mirrored: the surface is a mirror, and other samples have its reflection.
-        alpha_sample: for rays at blended surfaces, see `relume.raytrace.surface_points.SurfacePoints`.
+        alpha_sample: alpha samples for rays at blended surfaces, see `relume.raytrace.surface_points.SurfacePoints`.
     """
 
     pixel: Shaped[NDArray[np.uint32], " n"]
@@ -108,7 +109,7 @@ def dither_thresholds(pixel: Shaped[NDArray[np.int64], " n"], width: int) -> Sha
     """Interleaved gradient noise in [0, 1), which differs strongly between neighboring pixels (Jimenez 2014).
 
     Args:
-        pixel: row-major indices. width: of the image.
+        pixel: row-major indices. width: width of the image.
     """
     y, x = np.divmod(pixel, width)
     return np.asarray((52.9829189 * ((0.06711056 * x + 0.00583715 * y) % 1)) % 1, np.float32)
@@ -159,7 +160,7 @@ def sample_pixels(
 
     Args:
         camera_setup: the camera. scratch: opens a temporary file that is deleted when it is closed.
-        names: of the required columns. smooths_edges, by_channel: see `sample_view`.
+        names: names of the required columns. smooths_edges, by_channel: see `sample_view`.
     Returns:
         The columns of `ViewSamples`, of its surface, points and chain, by name; and the number of traced rays.
     """
@@ -195,7 +196,7 @@ def _sample_tiles(
     """Find samples tile by tile.
 
     Args:
-        camera_setup: the camera. edges: of its image. positions: of the rays in each edge pixel. (n, 2)
+        camera_setup: the camera. edges: edges of its image. positions: positions of the rays in each edge pixel. (n, 2)
         sample_limit: maximum number of samples. scratch, names: see `sample_pixels`.
     Returns:
         The samples, None if they exceed the limit; and the number of traced rays.
@@ -223,7 +224,7 @@ def view_sample_limit(materials: Sequence[Material], num_pixels: int) -> int:
     image may have fewer samples per pixel; if leaves or hair need more, edges get fewer positions.
 
     Args:
-        materials: of the scene. num_pixels: of the image.
+        materials: materials of the scene. num_pixels: number of pixels of the image.
     """
     samples_per_pixel = min(max(_SAMPLES_PER_SIDE / math.sqrt(num_pixels), len(PATTERNS[-1])), POSITIONS_PER_PIXEL)
     return math.ceil(samples_per_pixel * num_pixels) * max_samples(materials)
@@ -276,7 +277,7 @@ def _split_tinted(
     """Split samples that light reaches through tinted glass; return no columns if the limit is exceeded.
 
     Args:
-        camera_setup: the camera. columns: of its samples. sample_limit: maximum number of samples of the plan.
+        camera_setup: the camera. columns: columns of its samples. sample_limit: maximum number of samples of the plan.
         by_channel: see `sample_view`.
     Returns:
         Columns that replace the given ones; and the number of traced rays.

@@ -1,4 +1,4 @@
 """Shared foundations: errors, validation, the cache, thread pools, files, source hashes, Numba options.
 
-Imports no other package of relume. Read first: `errors`, `cache`.
+This package imports nothing else from relume. Start with `errors` and `cache`.
 """

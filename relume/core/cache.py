@@ -21,7 +21,7 @@ from relume.core.errors import MemoryBudgetError
 from relume.core.memory_usage import live_bytes
 
 _WORD_START = re.compile(r"(?<=[a-z])(?=[A-Z])")
-_ASSETS_BYTES = 1 << 30  # for a cache of assets alone
+_ASSETS_BYTES = 1 << 30  # budget of a cache that holds only assets
 TRANSIENT_BUDGET_DIVISOR = 8  # transient entries evict persistent ones until they hold budget / this
 
 ASSETS = "assets"  # owner of entries computed from files that looks of any bake name: see `asset_cached`
@@ -47,7 +47,7 @@ class CacheOwner(NamedTuple):
     """Owner of cached bytes.
 
     Attributes:
-        kind: type of entry, e.g. "linear operator" or "lights". bake: the name of its store; "" if several share it.
+        kind: type of entry, e.g. "linear operator" or "lights". bake: name of the bake's store; "" if bakes share it.
     """
 
     kind: str
@@ -201,7 +201,7 @@ class Cache:
         Transient results are not cached if persistent entries fill the cache.
 
         Args:
-            key: identifies the entry. kind: its class.
+            key: identifies the entry. kind: class of the entry.
         Raises:
             MemoryBudgetError: the entry alone is larger than the budget.
         """

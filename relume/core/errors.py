@@ -15,12 +15,17 @@ def bytes_text(num_bytes: float) -> str:
     return f"{size:.0f} {unit}" if unit == "bytes" or size >= 99.5 else f"{size:.2g} {unit}"
 
 
+def count_text(count: int, singular: str, plural: str) -> str:
+    """Format a count with its noun, `singular` or `plural`: 1 entry, 2 entries."""
+    return f"{count:,} {singular if count == 1 else plural}"
+
+
 class RelumeError(Exception):
     """Base class of all relume errors; any other exception that escapes is a defect."""
 
 
 class NotFoundError(RelumeError):
-    """There is no object of that name."""
+    """No object has that name."""
 
 
 class SceneError(RelumeError, ValueError):
@@ -31,17 +36,23 @@ class MaterialError(RelumeError, ValueError):
     """A measured material cannot be used as it is."""
 
 
+class Description(str):
+    """Words that stand for a value in a message, without quotation marks: "a list of 3 looks"."""
+
+    __slots__ = ()
+
+
 class ParameterError(RelumeError, ValueError):
     """A value is not allowed for its parameter.
 
     Attributes:
         name: JSON pointer or name of the parameter.
-        value: the given value.
+        value: the given value, or a `Description` of it.
         allowed: the accepted values, in words.
     """
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
-        text = "nothing" if value is None else repr(value)
+        text = "missing" if value is None else value if isinstance(value, Description) else repr(value)
         if len(text) > 80:
             text = text[:77] + "..."
         super().__init__(f"{name} is {text}; give {allowed}")

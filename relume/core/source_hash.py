@@ -8,21 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
 _IMPORT = re.compile(r"^\s*(?:from (\w[\w.]*) import (\([^)]*\)|[^\n#]*)|import (\w[\w.]*))", re.MULTILINE)
 
-_IMAGES = ("methods", "operators", "live.fixed_camera")
+_IMAGES = ("live.opened", "operators", "live.fixed_camera")
 _COMPARISONS = (*_IMAGES, "reference")
 _BAKES = ("methods.registry", "scene.scene_folder", "store.run_bake")
-_AFTER_BAKES = (  # methods import these to open and display bakes
-    "operators", "live.fixed_camera", "transport",
-    "methods.local_lights", "methods.free_camera_error", "methods.free_camera_transfer", "methods.indirect_solver",
-    "methods.opened", "methods.retrace",
-)  # fmt: skip
 
 
 @cache
@@ -40,7 +35,7 @@ def comparison_code() -> str:
 @cache
 def bake_code() -> str:
     """Hash of the code that makes bakes from scenes. 16 hexadecimal digits"""
-    return code_hash(collect_sources(_BAKES, exclude=_AFTER_BAKES))
+    return code_hash(collect_sources(_BAKES))
 
 
 def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
@@ -51,22 +46,20 @@ def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
     return digest.hexdigest()[:16]
 
 
-def collect_sources(names: Iterable[str], exclude: Collection[str] = (), package: Path = _PACKAGE) -> set[Path]:
+def collect_sources(names: Iterable[str], package: Path = _PACKAGE) -> set[Path]:
     """Collect the sources of modules of a package and of all modules of the package that they import, transitively.
 
     Args:
         names: modules relative to the package, e.g. "store.writer"; for a subpackage, all of its modules.
-        exclude: subpackages and modules to omit, with everything that only they import.
         package: folder of the package.
     Raises:
-        ModuleNotFoundError: a name in `names` or `exclude` does not exist.
+        ModuleNotFoundError: a name in `names` does not exist.
     """
-    excluded = {source.with_suffix("") for name in exclude for source in _roots(package, name)}
     sources: set[Path] = set()
     todo = [source for name in names for source in _roots(package, name)]
     while todo:
         path = todo.pop()
-        if path not in sources and path.with_suffix("") not in excluded:
+        if path not in sources:
             sources.add(path)
             todo.extend(imported_modules(package, path))
     return sources

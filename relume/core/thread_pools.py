@@ -4,7 +4,7 @@ Kernels release the GIL and work on ranges. Only this module splits work, so tha
 same cores. A precomputation submits hundreds of ranges at once, and the few ranges of a frame must not queue behind
 them: the calling thread decides which pool works, and the system gives frames most of a contended core. When as many
 frames are computed at once as there are threads, each uses its own thread: splitting and waiting would only cost time.
-`RELUME_THREADS` bounds each pool; worker processes set it to 1.
+`RELUME_THREADS` bounds each pool; worker processes set it to 1, and use `all_cores` for work that somebody waits for.
 """
 
 from __future__ import annotations
@@ -37,13 +37,15 @@ _FRAME, _LOW_PRIORITY, _LONG = "frame", "beside", "long"
 _NICE = {_FRAME: 0, _LOW_PRIORITY: 19, _LONG: 5}
 
 _lock = threading.Lock()
-_thread_state = threading.local()  # pool: receives this thread's kernels. is_of_pool: this is a pool thread
+_thread_state = threading.local()  # pool: of its kernels. is_of_pool: a pool's thread. has_all_cores: see below
 _pools: dict[str, ThreadPoolExecutor] = {}
 _frame_threads: list[int] = []  # threads that compute frames now
 
 
 def num_threads() -> int:
-    """Number of ranges that run at once: `RELUME_THREADS`, or the cores available to this process."""
+    """Number of ranges of this thread that run at once: `RELUME_THREADS`, or the cores available to this process."""
+    if getattr(_thread_state, "has_all_cores", False):
+        return _AVAILABLE
     requested = os.environ.get("RELUME_THREADS", "")
     return max(1, min(int(requested), 256)) if requested.isdigit() else _AVAILABLE
 
@@ -77,6 +79,16 @@ def low_priority() -> Iterator[None]:
         yield
     finally:
         _thread_state.pool = before
+
+
+@contextmanager
+def all_cores() -> Iterator[None]:
+    """Context in which this thread's kernels use all cores, whatever `RELUME_THREADS` is."""
+    _thread_state.has_all_cores = True
+    try:
+        yield
+    finally:
+        _thread_state.has_all_cores = False
 
 
 def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError, count_text
 
 Pointer = tuple[str | int, ...]
 MAX_COLOR = 1e4
@@ -24,9 +24,12 @@ def invalid_value(pointer: Pointer, value: object, allowed: str) -> ParameterErr
         allowed: the allowed values, as the end of a sentence.
     """
     if isinstance(value, dict | list | tuple):
-        value = f"{'an object' if isinstance(value, dict) else 'a list'} of {len(value)}"  # its text could be huge
+        kind = "an object" if isinstance(value, dict) else "a list"
+        value = Description(f"{kind} of {count_text(len(value), 'entry', 'entries')}")  # its text could be huge
+    elif value is None:
+        value = Description("null")
     elif isinstance(value, int) and value.bit_length() > 64:
-        value = "an integer beyond 64 bits"  # too long to be printed
+        value = Description("an integer beyond 64 bits")  # too long to be printed
     return ParameterError(pointer_text(pointer), value, allowed)
 
 
@@ -46,8 +49,8 @@ def check_number(pointer: Pointer, value: Any, minimum: float, maximum: float) -
     """Reject anything but a number in [minimum, maximum], NaN and infinities included.
 
     Args:
-        pointer: location in the document. value: of any type.
-        minimum, maximum: both allowed.
+        pointer: location in the document. value: value of any type.
+        minimum, maximum: inclusive bounds.
     Raises:
         ParameterError: the value is not allowed.
     """
@@ -59,8 +62,8 @@ def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: f
     """Reject anything but one number or three numbers for R, G, B.
 
     Args:
-        pointer: location in the document. value: of any type.
-        minimum, maximum: of each number, both allowed.
+        pointer: location in the document. value: value of any type.
+        minimum, maximum: inclusive bounds of each number.
     Raises:
         ParameterError: the value is not allowed.
     """
@@ -74,8 +77,8 @@ def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, l
     """Reject anything but three numbers in [minimum, maximum].
 
     Args:
-        pointer: location in the document. value: of any type.
-        minimum, maximum: of each number, both allowed.
+        pointer: location in the document. value: value of any type.
+        minimum, maximum: inclusive bounds of each number.
         label: name of the allowed values in the message.
     Raises:
         ParameterError: the value is not allowed.
@@ -90,7 +93,7 @@ def check_object(pointer: Pointer, value: Any, allowed: Iterable[str]) -> None:
     """Reject anything but an object with fields from `allowed`.
 
     Args:
-        pointer: location in the document. value: of any type.
+        pointer: location in the document. value: value of any type.
         allowed: names of fields.
     Raises:
         ParameterError: the value is not an object, or has an unknown field.
@@ -100,4 +103,4 @@ def check_object(pointer: Pointer, value: Any, allowed: Iterable[str]) -> None:
     unknown = value.keys() - set(allowed)
     if unknown:
         name = min(unknown, key=str)
-        raise invalid_value((*pointer, name), "unknown", f"one of {names_text(allowed)}, or leave it out")
+        raise invalid_value((*pointer, name), Description("unknown"), f"one of {names_text(allowed)}, or leave it out")

@@ -48,7 +48,7 @@ def write_scanlines(path: Path, channels: Channels, attributes: Attributes, prec
         path: the file.
         channels: name, such as "R" or "light_Key.R", and values, (height, width), possibly memory-mapped.
         attributes: text, numbers, vectors, and matrices (4, 4) in OpenEXR's convention of row vectors.
-        precision: of the values; half clamps them to 65,504.
+        precision: float type of the values; half clamps them to 65,504.
     Raises:
         OSError: the file cannot be written.
     """

@@ -29,7 +29,10 @@ ChooseRows = Callable[[int, int], int]
 def check_claim(claimed_bytes: int, data: bytes, label: str) -> None:
     """Reject headers that claim more pixels than the file could contain: a few bytes may claim gigabytes.
 
-    claimed_bytes: of pixels. data: of the file. label: of the file in messages. Raises SceneError.
+    Args:
+        claimed_bytes: size of the pixels. data: contents of the file. label: name of the file in messages.
+    Raises:
+        SceneError: the header claims too much.
     """
     if claimed_bytes > max(FREE_BYTES, MAX_EXPANSION * len(data)):
         raise SceneError(
@@ -52,7 +55,7 @@ def read_pixels(data: bytes, suffix: str, label: str, check_size: CheckSize) -> 
     """Decode an image with OpenImageIO from a private temporary file; the size is checked before pixels are read.
 
     Args:
-        data: of the file. suffix: according to its first bytes. label: name in messages.
+        data: contents of the file. suffix: format, determined from the first bytes. label: name in messages.
         check_size: raises SceneError if width and height are not allowed.
     Returns:
         The first R, G and B, or one channel for all

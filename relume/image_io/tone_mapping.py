@@ -1,9 +1,10 @@
-"""Display encoding of linear radiance: exposure, tone map, sRGB. The editor's shader computes the same.
+"""Tone mapping: applies exposure, a tone curve and sRGB encoding to linear radiance.
 
-A view of an OpenColorIO config may replace tone map and sRGB; it outputs the values for its display.
+The editor's shader computes the same. An OpenColorIO view can replace the tone curve and sRGB; its output is for the
+view's display.
 
-`agx`: Troy Sobotka's AgX, base look, its curve as the polynomial of Benjamin Wrensch ("Minimal AgX Implementation",
-2023). `filmic`: Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2015. `none`: clipped at one.
+`agx`: the base look of Troy Sobotka's AgX, with the polynomial curve of Benjamin Wrensch ("Minimal AgX Implementation",
+2023). `filmic`: Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2015. `none`: no curve, clipped at one.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _AGX, _FILMIC = np.int64(1), np.int64(2)
 _PIXELS_PER_RANGE = 1 << 15
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_MAX_RADIANCE = np.float32(1e9)  # far above white in every map; keeps infinities out of divisions
+_MAX_RADIANCE = np.float32(1e9)  # far above white in every tone curve; avoids inf/inf
 _INSET = np.array(
     [
         [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
@@ -96,14 +97,14 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
 def tone_map(
     image: Shaped[F32, "height width channels"], exposure: float, name: str | OcioView, *, use_table: bool = False
 ) -> Shaped[F32, "height width channels"]:
-    """Display values, in [0, 1], of linear radiance: sRGB-encoded, or for the display of an OpenColorIO view.
+    """Convert linear radiance to display values in [0, 1]: sRGB, or for the display of an OpenColorIO view.
 
     Args:
-        image: linear Rec. 709; negative values and NaN are black.
+        image: linear Rec. 709; negative values and NaN become black.
         exposure: stops. name: one of TONE_MAPS, or a view of the active config.
-        use_table: evaluate views by LUTs, like the editor's shader; otherwise by OpenColorIO.
+        use_table: evaluate OpenColorIO views by LUTs, as the editor's shader does, instead of by the library.
     Raises:
-        ParameterError: no tone map of that name. ShapeMismatchError: not an RGB image.
+        ParameterError: there is no tone map of that name. ShapeMismatchError: not an RGB image.
     """
     if image.ndim != 3 or image.shape[2] != 3:
         raise ShapeMismatchError(f"an image has the shape (height, width, 3), not {image.shape}; reshape it")

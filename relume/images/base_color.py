@@ -63,7 +63,7 @@ def base_color_terms(terms: Sequence[Document]) -> tuple[list[int], list[int]]:
     """Find the terms that show the base color of the dielectric and of the metallic part; first the one with f0.
 
     Args:
-        terms: of a material, complete.
+        terms: terms of a material, complete.
     Raises:
         ParameterError: there is no such term.
     """

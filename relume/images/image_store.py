@@ -46,7 +46,7 @@ class ImageRecipe(NamedTuple):
         metalness: the metalness image. base: the base color image; or "diffuse" or "scene" for the scene's own
             textures; None for a uniform color.
         scene, material: origin of these textures, or empty.
-        factor: of the base color. dielectric: reflectance at normal incidence. Three numbers each.
+        factor: factor of the base color. dielectric: reflectance at normal incidence. Three numbers each.
     """
 
     channel: str
@@ -68,8 +68,9 @@ class ImageRecord:
     """An image in lists.
 
     Attributes:
-        created: seconds since 1970. size: width and height. warnings: about the import, one sentence each.
-        roughness: mean, as a roughness map. recipe: inputs of a derived image; None for an uploaded one.
+        created: seconds since 1970. size: width and height. warnings: warnings about the import, one sentence each.
+        roughness: mean roughness, if used as a roughness map.
+        recipe: inputs of a derived image; None for an uploaded one.
     """
 
     id: str
@@ -90,7 +91,7 @@ def store(folder: Path, source: Path, name: str) -> ImageRecord:
     """Import an image file; an existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store. source: a .png, .jpg, .webp or .exr file. name: shown to users.
+        folder: folder of the asset store. source: a .png, .jpg, .webp or .exr file. name: shown to users.
     Raises:
         SceneError: the file is unusable, or the store is full.
     """
@@ -106,9 +107,10 @@ def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callabl
     """Store a derived image under the hash of its recipe; an existing one is not computed again.
 
     Args:
-        folder: of the asset store. name: shown to users. recipe: its inputs. compute: returns its texels, as bytes.
+        folder: folder of the asset store. name: shown to users. recipe: its inputs.
+        compute: returns its texels, as bytes.
     Raises:
-        SceneError: the store is full. And what `compute` raises.
+        SceneError: the store is full. Errors of `compute` propagate.
     """
 
     def fill(staged_folder: Path) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def with_metalness(
     """Apply a metalness image to a material.
 
     Args:
-        folder: of the image store. terms: of the material, complete. image: id of the image.
+        folder: folder of the image store. terms: terms of the material, complete. image: id of the image.
         scene, material: origin of the terms' texture channels. read: reads that material.
     Returns:
         The terms: diffuse terms and highlights have textures that are derived from the image, and f0 is the mean.

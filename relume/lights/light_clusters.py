@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from relume.core.color import luminance
 from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.sphere_tiles import SOLID_ANGLE_EXPONENT, UNIFORM_FRACTION, Tiles
-from relume.lights.spherical_triangles import TriangleLights, TriangleSubset, merge_groups
+from relume.lights.spherical_triangles import MergedParts, TriangleLights, merge_clusters
 from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
 
 F64 = NDArray[np.float64]
@@ -26,7 +26,7 @@ _LIGHTS_PER_CLUSTER, _MIN_CLUSTERS = 8, 400
 
 
 def num_clusters(num_lights: int) -> int:
-    """Return the number of merged lights of a merged-light operator. num_lights: of the bake."""
+    """Return the number of merged lights of a merged-light operator. num_lights: number of lights of the bake."""
     return max(_MIN_CLUSTERS, num_lights // _LIGHTS_PER_CLUSTER)
 
 
@@ -34,14 +34,15 @@ def cluster_lights(lights: TriangleLights, tiles: Tiles, num_clusters: int) -> T
     """Merge the light of tiles into about `num_clusters` triangles, with their parts.
 
     Args:
-        lights: of the tiles. tiles: M tiles. num_clusters: rounded down to 8 + 3k; not above M.
+        lights: lights of the tiles. tiles: M tiles. num_clusters: number of merged triangles, at most M;
+            rounded down to the form 8 + 3k.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     codes, group = np.unique(_coarser_codes(tiles, luminous, num_clusters), return_inverse=True)
-    clusters = merge_groups(lights, group, codes)
+    clusters = merge_clusters(lights, group, codes)
     cluster_light = np.bincount(group, luminous, len(codes))
     fraction = np.divide(luminous, cluster_light[group], out=np.zeros_like(luminous), where=luminous > 0)
-    return replace(clusters, parts=TriangleSubset(group.astype(np.int32), fraction.astype(np.float32)))
+    return replace(clusters, parts=MergedParts(group.astype(np.int32), fraction.astype(np.float32)))
 
 
 def _coarser_codes(tiles: Tiles, luminous: F64, num_clusters: int) -> Codes:
@@ -62,7 +63,7 @@ def visible_fraction(visible, group, fraction, start, stop, visible_fractions): 
 
     Args:
         visible: part m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
-        group, fraction: see `TriangleSubset`. visible_fractions: written, points last, since these are vectorized.
+        group, fraction: see `MergedParts`. visible_fractions: written, points last, since these are vectorized.
             (C, ≥ stop - start) float32
     """
     num_points = stop - start
@@ -88,7 +89,7 @@ def weight_by_visibility(first, light, visible_fractions, shading):  # type: ign
     Args:
         first, light: from `relume.transport.light_culling.list_lights`. visible_fractions: from `visible_fraction`.
             (C, ≥ points)
-        shading: of each entry, multiplied. (1 or 3, K) float32
+        shading: shading of each entry, multiplied. (1 or 3, K) float32
     """
     for p in range(first.shape[0] - 1):
         for row in range(shading.shape[0]):

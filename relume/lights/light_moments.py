@@ -24,7 +24,8 @@ class LightTexels(NamedTuple):
     """The texels of an environment, or other small areas, and their tiles.
 
     Attributes:
-        tile: of each texel. luminous: luminance × solid angle. directions: unit. solid_angles: of the texels, sr.
+        tile: tile index of each texel. luminous: luminance × solid angle. directions: unit.
+        solid_angles: solid angles of the texels, sr.
     """
 
     tile: Shaped[NDArray[np.int32], " n"]
@@ -67,7 +68,7 @@ def compute_moments(
     """Return m and S of some tiles.
 
     Args:
-        texels: of all tiles. total: luminous light of each fitted tile. mean: its direction n.
+        texels: texels of all tiles. total: luminous light of each fitted tile. mean: mean direction n of each.
         frames: the two tangents t. fitted: indices of the tiles.
     """
     fitted_index = np.full(int(max(texels.tile.max(initial=-1), fitted.max(initial=-1))) + 1, -1, np.int32)

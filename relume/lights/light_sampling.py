@@ -33,8 +33,8 @@ class LightStrata(NamedTuple):
     """Samples of an area light, before they are shifted.
 
     Attributes:
-        corner: of each sample's cell. size: of all cells.
-        uv: samples within their cells, in units of the size. seed: of the shifts.
+        corner: corner of each sample's cell. size: size of all cells.
+        uv: samples within their cells, in units of the size. seed: seed of the shifts.
     """
 
     corner: Shaped[F32, "N 2"]
@@ -47,9 +47,10 @@ class EmitterParts(NamedTuple):
     """Hierarchy of parts of an area light's surface: all of it, its 4 quarters, 16, … down to cells of samples.
 
     Attributes:
-        corners: of each part, meters. normal: unit.
+        corners: corners of each part, meters. normal: unit.
         first_fraction: fraction of the part's light in the first of its triangles 0 1 2 and 0 2 3.
-        center: of the part. radius: from there to the farthest corner, meters; `NOT_FLAT_RADIUS` if it is not flat.
+        center: center of the part.
+        radius: from there to the farthest corner, meters; `NOT_FLAT_RADIUS` if it is not flat.
     """
 
     corners: Shaped[F32, "P 4 3"]
@@ -76,7 +77,7 @@ def split_axes(num_pieces: int, num_samples: int) -> tuple[int, ...]:
     """Choose the axis of each halving, 0 for u and 1 for v: more of them along u for many pieces.
 
     Args:
-        num_pieces: of the surface. num_samples: a power of four
+        num_pieces: number of pieces of the surface. num_samples: a power of four
     """
     num_splits = num_samples.bit_length() - 1
     num_v_splits = num_splits - min(num_splits, max(num_splits // 2, max(0, num_pieces - 1).bit_length()))
@@ -84,7 +85,7 @@ def split_axes(num_pieces: int, num_samples: int) -> tuple[int, ...]:
 
 
 def make_strata(split_axis: tuple[int, ...], seed: int) -> LightStrata:
-    """Create samples. split_axis: from `split_axes`. seed: of the shifts"""
+    """Create samples. split_axis: from `split_axes`. seed: seed of the shifts"""
     cell, (bits_u, bits_v) = _list_cells(split_axis), (split_axis.count(0), split_axis.count(1))
     size = np.array([0.5**bits_u, 0.5**bits_v])
     # of the Hammersley points (i/N, radical inverse of i), the one in the cell
@@ -122,7 +123,8 @@ def subdivide_emitter(
 
     Args:
         split_axis: from `split_axes`.
-        corner, edges, power_cdf, is_rectangle: of the surface's pieces, see `relume.lights.local_lights.LocalLight`.
+        corner, edges, power_cdf, is_rectangle: fields of the surface's pieces, see
+            `relume.lights.local_lights.LocalLight`.
     """
     pieces = _Pieces(corner.astype(np.float64), edges.astype(np.float64), power_cdf.astype(np.float64), is_rectangle)
     quarters = [pieces.subdivide(split_axis[:count]) for count in range(0, len(split_axis) + 1, 2)]

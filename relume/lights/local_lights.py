@@ -49,10 +49,10 @@ class LocalLight(NamedTuple):
 
     Attributes:
         kind: `POINT` (spots too), `DIRECTIONAL` or `SURFACE`.
-        position: of point lights. axis: unit, of spots, and the direction in which directional light travels.
+        position: position of point lights. axis: unit axis of spots; direction of travel of directional light.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
-        corner, edges, normal: of parallelograms or triangles; unit normals.
-        power_cdf: cumulative power of the pieces. area: of all pieces, m², weighted by their relative radiance.
+        corner, edges, normal: corner, edges and normals of parallelograms or triangles; unit normals.
+        power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
         is_rectangle: a parallelogram, else triangles. is_two_sided: emits to both sides.
     """
 
@@ -74,7 +74,7 @@ class LightTriangles(NamedTuple):
     """Emissive triangles.
 
     Attributes:
-        corners: of the triangles. relative_radiance: radiance of each over the mean of all.
+        corners: corners of the triangles. relative_radiance: radiance of each over the mean of all.
         is_two_sided: emits to both sides.
     """
 
@@ -89,7 +89,7 @@ def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
-    """Create the samples of a light. num_rectangle_samples: of a rectangle, a power of four"""
+    """Create the samples of a light. num_rectangle_samples: samples of a rectangle, a power of four"""
     factor = _SAMPLE_FACTORS["rectangle" if light.is_rectangle else "mesh"]
     num_light_samples = factor * num_rectangle_samples if light.kind == SURFACE else 1
     return make_strata(split_axes(len(light.power_cdf), num_light_samples), _SEED)
@@ -102,7 +102,7 @@ def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
 
 
 def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | None = None) -> LocalLight:
-    """Prepare a light of a look. triangles: of a light of kind "mesh"; without area it emits nothing."""
+    """Prepare a light of a look. triangles: triangles of a light of kind "mesh"; without area it emits nothing."""
     is_rectangle = geometry.kind == "rectangle"
     corner, edges = _outline(geometry, triangles)
     piece_normals = np.cross(edges[:, 0], edges[:, 1])
@@ -130,7 +130,7 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
 
 
 def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
-    """Reduce a light to the geometry of its shadows: a spot has those of a point light."""
+    """Reduce a light to the geometry of its shadows: a spot casts those of a point light."""
     return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
 
 

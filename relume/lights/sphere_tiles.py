@@ -37,7 +37,7 @@ UNIFORM_FRACTION = 1e-2
 _RELIGHTABLE_UNIFORM_FRACTION = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
-# counter-clockwise from outside, as are all descendants; in the order of the signs of x, y, z
+# counterclockwise from outside, as are all descendants; in the order of the signs of x, y, z
 _OCTANTS = np.array([(5, 3, 1), (1, 3, 4), (1, 2, 5), (4, 2, 1), (0, 3, 5), (4, 3, 0), (5, 2, 0), (0, 2, 4)])
 # corners of the children at a, b, c and in the middle, among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
@@ -76,7 +76,7 @@ class Tiles:
 
     @cached_property
     def corners(self) -> Shaped[F64, "M 3 3"]:
-        """Unit directions of the corners of each tile, counter-clockwise from outside."""
+        """Unit directions of the corners of each tile, counterclockwise from outside."""
         return _corners(self.codes)
 
     @cached_property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from jaxtyping import Shaped
@@ -19,16 +19,18 @@ from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_MIN_TANGENT_COSINE = 0.8  # triangles within 37° of their light are matched in its tangent plane, larger ones are kept
-_MAX_LIGHTS_PER_GROUP = 12
-_MIN_GROUPED_LIGHTS = 200  # with fewer lights groups save nothing
+# moments are matched if all corners are within 37° of the mean light direction; larger triangles stay unchanged
+_MIN_TANGENT_COSINE = 0.8
+_MAX_LIGHTS_PER_CLUSTER = 12
+_MIN_CLUSTERED_LIGHTS = 200  # with fewer lights, clusters save no time
 
 
-class TriangleSubset(NamedTuple):
+class MergedParts(NamedTuple):
     """Parts of merged triangles: M triangles of a finer division, with their own visibility.
 
     Attributes:
-        group: the merged triangle of each part. fraction: of that triangle's light.
+        group: index of the merged triangle of each part.
+        fraction: fraction of the merged triangle's light that each part has.
     """
 
     group: Shaped[NDArray[np.int32], " M"]
@@ -48,14 +50,14 @@ class TriangleLights:
         nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca, one row per axis.
         direction: mean direction of the light, and of shadow rays.
         irradiance: ∫ L dω over the tile: irradiance on a surface perpendicular to it; per channel.
-        parts: of merged triangles, with visibility per part.
-        codes: of the tiles in the hierarchy, see `Tiles`; None if not needed.
+        parts: parts of merged triangles, with visibility per part; None if the triangles are not merged.
+        codes: code of each tile in the hierarchy, see `Tiles`; None if not needed.
     """
 
     nodes: Shaped[F32, "3 6 M"]
     direction: Shaped[F32, "M 3"]
     irradiance: Shaped[F32, "M 3"]
-    parts: TriangleSubset | None = None
+    parts: MergedParts | None = None
     codes: Shaped[NDArray[np.uint64], " M"] | None = None
 
     @property
@@ -90,20 +92,21 @@ class TriangleLights:
         return np.asarray(np.square(middles - middles.mean(axis=1, keepdims=True)).sum(axis=(0, 1)))
 
     @cached_property
-    def groups(self) -> LightGroups | None:
-        """Groups of adjacent lights; None for few lights."""
-        if self.codes is None or self.num_lights < _MIN_GROUPED_LIGHTS:
+    def clusters(self) -> LightClusters | None:
+        """Clusters of adjacent lights; None for few lights."""
+        if self.codes is None or self.num_lights < _MIN_CLUSTERED_LIGHTS:
             return None
-        return _group_lights(self, self.codes, _MAX_LIGHTS_PER_GROUP)
+        return _cluster_lights(self, self.codes, _MAX_LIGHTS_PER_CLUSTER)
 
 
-class LightGroups(NamedTuple):
-    """Adjacent lights, merged for points that see all lights of a group.
+class LightClusters(NamedTuple):
+    """Clusters of adjacent lights, each merged into one light for points that see the whole cluster.
 
     Attributes:
-        lights: one for each of G groups.
-        first: begin of each group's lights. light_index: the lights in the groups.
-        between_variance: fraction of a group's variance between its lights; the rest is within them.
+        lights: merged light of each of G clusters.
+        first: start of each cluster in `light_index`, then the length of `light_index`.
+        light_index: indices of the lights, cluster by cluster.
+        between_variance: fraction of a cluster's variance between its lights; the rest is within them.
     """
 
     lights: TriangleLights
@@ -115,7 +118,7 @@ class LightGroups(NamedTuple):
 NO_LIGHTS = TriangleLights(np.empty((3, 6, 0), np.float32), *np.empty((2, 0, 3), np.float32))
 
 
-def _sum_by_index(index: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
+def _sum_by_index(index: NDArray[np.integer], values: F64, num: int) -> F64:
     """Sum the values (n,) with equal index (n,), in [0, num). (num,)"""
     return np.asarray(np.bincount(index, values, num), np.float64)
 
@@ -134,7 +137,7 @@ def _on_tangent_plane(directions: F64, normals: F64, frames: F64) -> F64:
 
 
 def _matrix_power(moments: F64, exponent: float) -> F64:
-    """Raise symmetric positive matrices (M, 2, 2) to a power; a vanishing extent is clamped above rounding."""
+    """Raise symmetric positive matrices (M, 2, 2) to a power; eigenvalues are clamped to at least 1e-14."""
     values, vectors = np.linalg.eigh(moments)
     powers = np.maximum(values, 1e-14) ** exponent
     return np.asarray((vectors * powers[:, None]) @ vectors.transpose(0, 2, 1))
@@ -143,10 +146,12 @@ def _matrix_power(moments: F64, exponent: float) -> F64:
 def match_moments(
     corners: Shaped[F64, "M 3 3"], texels: LightTexels
 ) -> tuple[Shaped[F64, "M 3 3"], Shaped[F64, "M 3"]]:
-    """Return triangles whose uniform light has the moments of the tiles' light, and its mean directions.
+    """Return triangles whose uniform light has the moments of the tiles' light, and the mean direction of each.
+
+    The mean direction is that of the light in the tile.
 
     Args:
-        corners: of the tiles. texels: light in the tiles.
+        corners: corners of the tiles. texels: light in the tiles.
     """
     num_tiles = len(corners)
     total = texels.sums(texels.luminous, num_tiles)
@@ -168,16 +173,17 @@ def match_moments(
     return matched_corners, mean
 
 
-def merge_groups(
-    lights: TriangleLights, group: Shaped[NDArray[np.integer[Any]], " M"], codes: Shaped[NDArray[np.uint64], " G"]
+def merge_clusters(
+    lights: TriangleLights, group: Shaped[NDArray[np.integer], " M"], codes: Shaped[NDArray[np.uint64], " G"]
 ) -> TriangleLights:
-    """Merge the lights of each group into one with the same light, mean direction and spread.
+    """Merge the lights of each cluster into one with the same light, mean direction and spread.
 
-    Its irradiance is that of the parts on a surface perpendicular to the mean direction, slightly less than the sum of
-    theirs, so that Σ L Ω cos θi is preserved wherever all parts are above the horizon.
+    The merged irradiance is Σ Eₚ cos(angle to the mean direction), slightly less than Σ Eₚ, so that Σ L Ω cos θi is
+    preserved wherever all parts are above the horizon.
 
     Args:
-        lights: M lights. group: of each. codes: of a node above each group.
+        lights: M lights. group: index of the cluster of each light.
+        codes: code of the hierarchy node that contains each cluster.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)
@@ -189,8 +195,8 @@ def merge_groups(
     return TriangleLights(pack_nodes(merged_corners), mean.astype(np.float32), irradiance.astype(np.float32))
 
 
-def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightGroups:
-    """Group 2 to `max_lights` lights below a common node. codes: of their tiles. (M,)"""
+def _cluster_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightClusters:
+    """Cluster 2 to `max_lights` lights below a common node. codes: code of each light's tile. (M,)"""
     inner, (num_below,) = sum_inner_nodes(codes, np.ones((1, len(codes))))
     group_codes, group, group_size = np.unique(
         highest_ancestors(codes, inner[num_below > max_lights]), return_inverse=True, return_counts=True
@@ -200,7 +206,7 @@ def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights:
     light_index = light_index[group_size[group[light_index]] > 1]
     group_index = group_number[group[light_index]]
     members = lights.select(light_index, lights.irradiance[light_index])
-    group_lights = merge_groups(members, group_index, group_codes[group_size > 1])
+    group_lights = merge_clusters(members, group_index, group_codes[group_size > 1])
     first, luminous = (
         np.searchsorted(group_index, np.arange(group_number[-1] + 2)),
         luminance(members.irradiance).astype(float),
@@ -209,7 +215,7 @@ def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights:
     total = _sum_by_index(group_index, luminous, group_lights.num_lights) * group_lights.variance
     within_fraction = np.divide(within_variance, total, out=np.ones_like(within_variance), where=total > 0)
     between_variance = np.clip(1 - within_fraction, 0, 1).astype(np.float32)
-    return LightGroups(group_lights, first.astype(np.int64), light_index.astype(np.int64), between_variance)
+    return LightClusters(group_lights, first.astype(np.int64), light_index.astype(np.int64), between_variance)
 
 
 def pack_nodes(corners: Shaped[F64, "M 3 3"]) -> Shaped[F32, "3 6 M"]:
@@ -219,11 +225,12 @@ def pack_nodes(corners: Shaped[F64, "M 3 3"]) -> Shaped[F32, "3 6 M"]:
 
 
 @dataclass(frozen=True)
-class RotatedEnvironment:
-    """The texels of an unrotated environment, computed once for all rotations.
+class EnvironmentTexels:
+    """Directions and light of the texels of an environment, before any rotation.
 
     Attributes:
-        light: radiance × solid angle. luminous: its luminance. directions: unit. solid_angles: of the texels, sr.
+        light: radiance × solid angle. luminous: luminance of `light`. directions: unit directions of the texels.
+        solid_angles: solid angles of the texels, sr.
     """
 
     light: Shaped[F64, "n 3"]
@@ -242,14 +249,14 @@ class RotatedEnvironment:
         return cls(light, luminous, directions, texel_angles)
 
 
-def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotation: float = 0.0) -> TriangleLights:
-    """Integrate the light of an environment in each tile; the tiles may be chosen for another environment.
+def integrate_environment(tiles: Tiles, environment: EnvironmentTexels, rotation: float = 0.0) -> TriangleLights:
+    """Integrate the light of an environment over each tile; the tiles may have been chosen for another environment.
 
-    O(texels · depth) time.
+    Takes O(texels · depth) time.
 
     Args:
-        tiles: M tiles of the sphere. environment: its texels.
-        rotation: of the environment about +Y, degrees, counter-clockwise from above.
+        tiles: M tiles of the sphere. environment: texels of the environment.
+        rotation: rotation of the environment about +Y, degrees, counterclockwise from above.
     """
     directions = rotate_about_y(environment.directions, rotation)
     texels = LightTexels(tiles.locate(directions), environment.luminous, directions, environment.solid_angles)
@@ -261,5 +268,5 @@ def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotatio
 
 
 def tessellate_environment(radiance: Shaped[F32, "height width 3"], num_lights: int) -> TriangleLights:
-    """Divide an environment into about `num_lights` triangles. Raises as `choose_tiles` does."""
-    return integrate_environment(choose_tiles(radiance, num_lights), RotatedEnvironment.from_radiance(radiance))
+    """Divide an environment into about `num_lights` triangles. Raises PlanError if it is outside [8, 65536]."""
+    return integrate_environment(choose_tiles(radiance, num_lights), EnvironmentTexels.from_radiance(radiance))

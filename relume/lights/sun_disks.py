@@ -31,7 +31,7 @@ class SunBounds(NamedTuple):
     """Criteria of a sun disk.
 
     Attributes:
-        inner_angle, outer_angle: from the brightest direction: of the disk, and of the dark ring around it; degrees.
+        inner_angle, outer_angle: radius of the disk, and of the dark ring around it, degrees.
         max_spread: root mean square of the angles to the disk's center, degrees.
     """
 
@@ -49,7 +49,7 @@ class SunDisk(NamedTuple):
 
     Attributes:
         irradiance: ∫ L dω, per channel.
-        mean: Σ ω L / Σ L, luminous; its length is below one by the disk's spread.
+        mean: mean direction Σ ω L / Σ L, weighted by luminance; the wider the disk, the shorter the vector.
         directions: unit directions with equal fractions of the light.
     """
 
@@ -139,7 +139,7 @@ def _remove_excess(
 
 
 def _make_sun_disk(bright: _BrightTexels, is_inside: NDArray[np.bool_], light: F64, size: tuple[int, int]) -> SunDisk:
-    """Build a disk from its texels. light: of each, L dω. (n, 3). size: height and width of the map"""
+    """Build a disk from its texels. light: light of each texel, L dω. (n, 3). size: height and width of the map"""
     rows, columns, luminous = bright.rows[is_inside], bright.columns[is_inside], luminance(light.astype(np.float32))
     mean = luminous @ bright.directions[is_inside] / luminous.sum()
     serpentine = np.where(rows % 2 == 0, columns, -columns)  # alternating direction: successive texels are adjacent

@@ -18,7 +18,7 @@ def sum_inner_nodes(
     """Return the sorted codes of the inner nodes above tiles, and the sums of the values below each.
 
     Args:
-        codes: of the tiles, see `relume.lights.sphere_tiles.Tiles`. values: of the tiles.
+        codes: codes of the tiles, see `relume.lights.sphere_tiles.Tiles`. values: values of the tiles.
     """
     ancestors, sums = [np.empty(0, np.uint64)], [values[:, :0]]
     while (is_deeper := codes >= _FIRST_INNER_CODE).any():
@@ -34,7 +34,7 @@ def highest_ancestors(codes: Shaped[Codes, " M"], split_codes: Shaped[Codes, " s
     """Return the highest node above each tile that is not split.
 
     Args:
-        codes: of the tiles. split_codes: split nodes, with all nodes above these.
+        codes: codes of the tiles. split_codes: split nodes, with all nodes above these.
     """
     ancestors = codes.copy()
     while True:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
-from relume.assets import environments
+from relume.assets.environments.environment_names import environment_exists, environment_names
 from relume.brdf.term_validation import complete_term
 from relume.brdf.texture_slots import check_image, check_shared
 from relume.core.errors import ParameterError
@@ -159,8 +159,8 @@ def _complete_environment(partial: Any, default: Mapping[str, Any], previous: Ma
 
 
 def _check_map(pointer: Pointer, name: Any) -> None:
-    if name is not None and not (isinstance(name, str) and environments.environment_exists(name)):
-        available = names_text(environments.environment_names())
+    if name is not None and not (isinstance(name, str) and environment_exists(name)):
+        available = names_text(environment_names())
         raise invalid_value(pointer, name, f"null for the scene's own, or an available environment: {available}")
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from relume.brdf.registry import TERMS
+from relume.look.light_validation import MIN_DIRECTION
 
 InterpolationMode = Literal["parameters", "map"]
 
@@ -65,7 +66,7 @@ def _interpolate(start: Any, end: Any, weight: float) -> Any:
     if isinstance(start, list) and isinstance(end, list) and len(start) == len(end):
         return [_interpolate(a, b, weight) for a, b in zip(start, end, strict=True)]
     if _is_number(start) and _is_number(end):
-        value = (1 - weight) * start + weight * end
+        value = _clamp((1 - weight) * start + weight * end, start, end)
         return round(value) if isinstance(start, int) and isinstance(end, int) else value
     return start if weight < 0.5 else end
 
@@ -73,10 +74,13 @@ def _interpolate(start: Any, end: Any, weight: float) -> Any:
 def _interpolate_fields(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> dict[str, Any]:
     """Interpolate fields that both have; other fields are those of the nearer keyframe."""
     nearest = start if weight < 0.5 else end
-    return {
+    fields = {
         name: _interpolate(start[name], end[name], weight) if name in start and name in end else value
         for name, value in nearest.items()
     }
+    if "direction" in fields and max(map(abs, fields["direction"])) < MIN_DIRECTION:  # between opposite directions
+        fields["direction"] = nearest["direction"]
+    return fields
 
 
 def _interpolate_terms(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> Mapping[str, Any]:
@@ -96,8 +100,13 @@ def _interpolate_log(start: Any, end: Any, weight: float) -> Any:
         first, second = (value if isinstance(value, list) else [value] * 3 for value in (start, end))
         return [_interpolate_log(a, b, weight) for a, b in zip(first, second, strict=True)]
     if start <= 0 or end <= 0:
-        return (1 - weight) * start + weight * end
-    return math.exp((1 - weight) * math.log(start) + weight * math.log(end))
+        return _clamp((1 - weight) * start + weight * end, start, end)
+    return _clamp(math.exp((1 - weight) * math.log(start) + weight * math.log(end)), start, end)
+
+
+def _clamp(value: float, start: float, end: float) -> float:
+    """Limit an interpolated value to its ends, which rounding may exceed."""
+    return min(max(value, min(start, end)), max(start, end))
 
 
 def _is_number(value: Any) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
+from relume.core.errors import Description
 from relume.core.validation import (
     MAX_COLOR,
     Pointer,
@@ -63,14 +64,16 @@ def complete_lights(partial: Any, default: Mapping[str, Any], previous: Mapping[
     """Merge `partial` into the scene's lights and append the lights that it adds. Raises ParameterError.
 
     Args:
-        default: of the scene. previous: of a valid look; objects shared with it are not validated again.
+        default: default look of the scene.
+        previous: a valid look; objects shared with it are not validated again.
     """
     pointer: Pointer = ("lights",)
     if not isinstance(partial, Mapping):
         raise invalid_value(pointer, partial, "an object with a field for each light to change or to add")
     names = [*default, *(name for name in partial if name not in default)]
     if len(names) > MAX_LIGHTS:
-        raise invalid_value(pointer, f"{len(names)} lights", f"at most {MAX_LIGHTS}, including the scene's own")
+        value = Description(f"an object with {len(names)} lights")
+        raise invalid_value(pointer, value, f"at most {MAX_LIGHTS} lights, including the scene's own")
     return {name: _complete_light(name, partial, default.get(name), previous.get(name)) for name in names}
 
 
@@ -80,7 +83,8 @@ def _complete_light(name: str, lights: Mapping[str, Any], default: Any, previous
         return partial
     pointer: Pointer = ("lights", name)
     if not 1 <= len(name) <= MAX_LIGHT_NAME:
-        raise invalid_value(pointer, f"a name of {len(name)} characters", f"a name of 1 to {MAX_LIGHT_NAME} characters")
+        value = Description(f"a name of {len(name)} characters")
+        raise invalid_value(pointer, value, f"a name of 1 to {MAX_LIGHT_NAME} characters")
     if not isinstance(partial, Mapping):
         raise invalid_value(pointer, partial, "an object")
     return _merge(pointer, partial, _base_fields(pointer, partial, default))
@@ -129,7 +133,9 @@ def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, An
         case "cone":
             _check_pair(pointer, value, *LIGHT_RANGES[field])
             if not (value[0] <= value[1] and value[1] > 0):
-                raise invalid_value(pointer, f"{value[0]:g} and {value[1]:g}", "inner ≤ outer, and outer above 0")
+                raise invalid_value(
+                    pointer, Description(f"{value[0]:g} and {value[1]:g}"), "inner ≤ outer, and outer above 0"
+                )
         case "material":
             if base["material"] not in ("", value):
                 raise invalid_value(pointer, value, f"{base['material']!r}: the scene decides which mesh emits")

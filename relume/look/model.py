@@ -94,7 +94,7 @@ BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
 
 
 class EnvironmentLook(_FrozenModel):
-    """The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counter-clockwise
+    """The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counterclockwise
     from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
 
     map: str | None

@@ -10,7 +10,7 @@ _VERTICAL = 2e-6  # horizontal part of a squared direction, as in `relume.lights
 
 
 def rotated_environment(document: Mapping[str, Any], degrees: float) -> dict[str, Any]:
-    """Rotate the environment of a look about +Y, counter-clockwise from above.
+    """Rotate the environment of a look about +Y, counterclockwise from above.
 
     Args:
         document: a complete look. degrees: any number.
@@ -23,7 +23,7 @@ def rotated_lights(document: Mapping[str, Any], degrees: float, center: Sequence
     """Rotate the environment and the lights of a look about a vertical axis; emissive meshes stay in place.
 
     Args:
-        document: a complete look. degrees: counter-clockwise from above. center: a point on the axis, meters.
+        document: a complete look. degrees: counterclockwise from above. center: a point on the axis, meters.
     """
     lights = {name: _rotate_light(light, degrees, center) for name, light in document["lights"].items()}
     return {**rotated_environment(document, degrees), "lights": lights}

@@ -18,7 +18,7 @@ class Clusters(NamedTuple):
     """Clusters of rows (n, R).
 
     Attributes:
-        cluster_index: cluster of each row, below K. mean: of each cluster.
+        cluster_index: cluster of each row, below K. mean: mean of each cluster.
         components: orthonormal, the strongest first; zeros if a cluster has fewer.
     """
 

@@ -89,7 +89,7 @@ def _recurrence(s: int, m: int) -> tuple[float, float, float]:
     return (t - 1) * t * (t - 2) / divisor, -(t - 1) * m * m / divisor, 2 * (s - 1) * (s + m - 1) * t / divisor
 
 
-def project(wi: Shaped[F64, "*batch 3"]) -> Shaped[F64, "*batch K"]:
+def basis_functions(wi: Shaped[F64, "*batch 3"]) -> Shaped[F64, "*batch K"]:
     """Evaluate all basis functions at local unit directions, z = normal; zero below the horizon."""
     table, power = recurrence(), np.ones(wi.shape[:-1], np.complex128)
     disk_point = wi[..., 0] + 1j * wi[..., 1]

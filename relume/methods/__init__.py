@@ -1,4 +1,4 @@
-"""Transfer methods `direct`, `gather` and `probes`: plan, bake and open.
+"""Transfer methods `direct`, `gather` and `probes`: what is planned and stored; nothing of pictures.
 
-Read first: `base`, then `direct`.
+Read first: `relume.store.bake_protocol`, then `direct`.
 """

@@ -8,17 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from relume.core.cache import Cache
 from relume.methods import plan_estimates
-from relume.methods.opened.described import read_fields
-from relume.methods.opened.fixed_views import BakedFixedViews
 from relume.methods.view_stages import SampledViews
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 
 
 class DirectMethod:
-    """Implements `relume.methods.base.TransferMethod`."""
+    """Implements `relume.store.bake_protocol.BakeMethod`."""
 
     name = "direct"
     stages = SampledViews.stages
@@ -50,7 +47,3 @@ class DirectMethod:
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
         """Compute a task; deterministic on any machine. See `BakeMethod`."""
         return self._views.compute(scene, recipe, task, store)
-
-    def open(self, store: StoreReader, key: str, cache: Cache) -> BakedFixedViews:
-        """Open views lit by the environment and by local lights. See `TransferMethod`."""
-        return BakedFixedViews(**read_fields(store, key, cache))

@@ -22,15 +22,16 @@ from numpy.typing import NDArray
 
 from relume.core.cache import get_asset
 from relume.core.folder_size import folder_bytes
-from relume.live.free_camera.probes.stored_scene import MAX_TEXTURE_SIDE
 from relume.methods import plan_estimates
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod, num_patches
 from relume.methods.probes import bound_store_bytes as parts_of_surface
+from relume.probes.stored_scene import MAX_TEXTURE_SIDE
 from relume.scene.model import Scene
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.publish import array_paths
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume.store.writer import create_store
 
 SMALL_BYTES = 32 << 20  # plans up to this size keep their bound
@@ -48,7 +49,7 @@ class DiskEstimate(NamedTuple):
     """Bytes on disk.
 
     Attributes:
-        store: of the finished store. scratch: of temporary files while samples are sorted.
+        store: path of the finished store. scratch: folder of temporary files while samples are sorted.
     """
 
     store: int
@@ -59,10 +60,10 @@ class Rates(NamedTuple):
     """Measured sizes of a trial bake, in bytes.
 
     Attributes:
-        samples: samples per pixel. pixels: of a trial image.
+        samples: samples per pixel. pixels: pixels of a trial image.
         sample: per view sample, without the following. light: per sample and light. gather_hits: per sample.
         patch: per patch, without lights. patch_light: per patch and light. per_light: per light.
-        constant: of everything that does not scale.
+        constant: sum of everything that does not scale.
     """
 
     samples: float
@@ -80,7 +81,7 @@ def estimate_disk(method: BakeMethod, scene: Scene, recipe: Recipe, plan: Plan) 
     """Estimate the disk space of a bake.
 
     Args:
-        method, scene, recipe: of the bake. plan: with its bound.
+        method, scene, recipe: method, scene and recipe of the bake. plan: with its bound.
     Returns:
         At most the bound; the bound itself if it is small or the method has no estimate.
     """

@@ -10,7 +10,7 @@ Stages after those of the views: "patches", then "gather rays" (rows of patches,
     patches/gather_hits                         patches that the rays of its points hit
     views/<k>/gather_hits                       patches that the rays of a view sample hit
     views/<k>/seed                              seeds the rays of a view sample
-    mirror_lights/…                             relume.methods.planar_mirror_light.MirrorLights: bright lights, planes
+    mirror_lights/…                             relume.methods.mirror_lights.MirrorLights: bright lights, planes
     views/<k>/mirror_lights                     lights that a view sample sees in planar mirrors
 """
 
@@ -24,13 +24,11 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import scatters_diffusely
 from relume.camera.planar_mirrors import lights_visible_in_mirrors
-from relume.core.cache import Cache
 from relume.methods import plan_estimates
-from relume.methods.opened.described import read_fields
-from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
-from relume.methods.planar_mirror_light import make_mirror_lights, max_mirror_lights, read_mirror_lights
+from relume.methods.mirror_lights import make_mirror_lights, max_mirror_lights, read_mirror_lights
+from relume.methods.patch_layout import read_patch_points, read_tree
 from relume.methods.read_cache import ReadCache
-from relume.methods.store_layout import SHARD_ROWS, read_patch_points, read_patches, read_tree
+from relume.methods.store_layout import SHARD_ROWS
 from relume.methods.view_stages import CHUNK_ROWS, SampledViews
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import MAX_PATCHES
@@ -48,13 +46,13 @@ _PIXELS_PER_PATCH, _MIN_PATCHES = 10, 1024
 _PATCH_STAGE, _RAY_STAGE = 2, 3
 _PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_POINT) + 64
 _NORMAL_BYTES = 240  # per triangle, while normals are computed
-_PATCH_BUILD_BYTES = 4000  # photons, their hits, and the tree that is built over them
+_PATCH_BUILD_BYTES = 4000  # importons, their hits, and the tree that is built over them
 _SHARD_ROW_BYTES = 500  # per sample besides its gather hits, which are held three times: traced, joined, written
 _RAY_NS, _TRIANGLE_US = 8.0, 3.0  # on one core, for scenes of 200 to a million triangles
 
 
 class GatherMethod:
-    """Implements `relume.methods.base.TransferMethod`.
+    """Implements `relume.store.bake_protocol.BakeMethod`.
 
     Args:
         rays: per view sample. glossy: number of these if the material has a highlight.
@@ -80,12 +78,6 @@ class GatherMethod:
     def prepare(self, scene: Scene) -> None:
         """Build the acceleration structure of the triangles."""
         self._views.prepare(scene)
-
-    def open(self, store: StoreReader, key: str, cache: Cache) -> BakedIndirectViews:
-        """Open views lit by the environment, local lights and indirect light. See `TransferMethod`."""
-        return BakedIndirectViews(
-            **read_fields(store, key, cache), patches=read_patches(store), mirror_lights=read_mirror_lights(store)
-        )
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Return upper bounds, from the recipe alone."""
@@ -116,12 +108,10 @@ class GatherMethod:
         """Return the store's attributes, with `gather_rays` (cosine, glossy) by material and filter passes."""
         rays, num_glossy = self._ray_counts(recipe)
         diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
-        direct = self._views.attributes(scene, recipe)
-        terms = [direct["look"]["materials"][material.name]["terms"] for material in scene.materials]
         return {
-            **direct,
+            **self._views.attributes(scene, recipe),
             "gather_rays": [
-                diffuse if all(map(scatters_diffusely, material_terms)) else glossy for material_terms in terms
+                diffuse if all(map(scatters_diffusely, material.terms)) else glossy for material in scene.materials
             ],
             "gather_filter_passes": self._num_tent_passes,
             "gather_seed": int(scene.id[:7], 16),

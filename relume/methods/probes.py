@@ -5,44 +5,43 @@ that its gather rays hit. Neither depends on a BRDF or a camera. Stages: "probes
 "visibility and gather rays" (rows of patches and of probes), "spherical harmonics", then "free-camera error", which
 reads the finished bake.
 
-    scene/positions, faces, face_material, uvs, textures, …  relume.live.free_camera.probes.stored_scene
+    scene/positions, faces, face_material, uvs, textures, …  relume.probes.stored_scene
     lights/…                                                 as in relume.methods.view_stages
     patches/…                                                as in relume.methods.gather
-    nodes/num_rows, first, node_index                        relume.live.free_camera.probes.triangle_grids.ProbeGrid
-    nodes/normal, probe, weight                              relume.live.free_camera.probes.lattice_nodes.LatticeNodes
-    probes/position, normal, tangent, material               relume.live.free_camera.probes.mesh_lattice.PlacedProbes
+    nodes/num_rows, first, node_index                        relume.probes.triangle_grids.ProbeGrid
+    nodes/normal, probe, weight                              relume.probes.lattice_nodes.LatticeNodes
+    probes/position, normal, tangent, material               relume.probes.mesh_lattice.PlacedProbes
     probes/visibility, probes/gather_hits                    lights visible from a probe; patches that its rays hit
     sh/…                                                     relume.methods.spherical_harmonic_transfer
     mirror_lights/…                                          as in relume.methods.gather, for static views
-    error/free_camera                                        relume.methods.free_camera_error
+    error/free_camera                                        relume.live.opened.free_camera_error
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.core.cache import Cache
 from relume.core.errors import PlanError
 from relume.lights.spherical_triangles import tessellate_environment
-from relume.live.free_camera.probes.density import density_from_distance, density_from_shadows
-from relume.live.free_camera.probes.interpolation_weights import PROBES_PER_NODE
-from relume.live.free_camera.probes.mesh_lattice import MAX_PROBES, make_corner_grid, max_grid_nodes, place_probes
-from relume.live.free_camera.probes.stored_scene import collect_textures, corner_tangents, ray_pattern, read_probes
-from relume.live.free_camera.probes.visible_sides import visible_sides
-from relume.methods import free_camera_error, plan_estimates
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.planar_mirror_light import make_mirror_lights
+from relume.methods import plan_estimates
+from relume.methods.mirror_lights import make_mirror_lights
+from relume.methods.patch_layout import read_patch_points, read_tree
 from relume.methods.read_cache import ReadCache
 from relume.methods.spherical_harmonic_transfer import harmonic_bytes, make_harmonic_light
-from relume.methods.store_layout import FREE_CAMERA_ERROR, read_free_camera_error, read_patch_points, read_tree
+from relume.methods.store_layout import FREE_CAMERA_ERROR
 from relume.methods.view_stages import CHUNK_ROWS, SampledViews, light_arrays, read_targets, triangle_arrays
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches
+from relume.probes.density import density_from_distance, density_from_shadows
+from relume.probes.interpolation_weights import PROBES_PER_NODE
+from relume.probes.mesh_lattice import MAX_PROBES, make_corner_grid, max_grid_nodes, place_probes
+from relume.probes.stored_scene import collect_textures, corner_tangents, ray_pattern, read_probes
+from relume.probes.visible_sides import visible_sides
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
@@ -51,6 +50,7 @@ from relume.raytrace.visibility_masks import LightTargets, trace_visibility_mask
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 
+_PICTURES = "relume.live.opened.free_camera_error"
 ROWS_PER_SHARD = 4096
 RAYS_PER_PROBE = 377  # a single probe then errs by less than 1 % of its radiance (`probes.probe_rmse`)
 RAYS_PER_PATCH_POINT = 55
@@ -64,11 +64,13 @@ _NODE_BYTES = 12 + 2 * 4 * PROBES_PER_NODE
 _NODE_BUILD_BYTES = 600  # while nodes are merged: their surface, their keys, and the order of these
 _PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_PATCH_POINT) + 64
 _PATCH_BUILD_BYTES = 4000
+_ERROR_PROBE_BYTES = 2600  # per probe while the error is measured: six vectors of 36 coefficients
+_ERROR_BYTES = 300 << 20  # of everything else: tables, environments, static views
 _RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # on one core, for scenes of 200 to a million triangles
 
 
 class ProbesMethod:
-    """Implements `relume.methods.base.TransferMethod`."""
+    """Implements `relume.store.bake_protocol.BakeMethod`."""
 
     name = "probes"
     stages = ("probes", "visibility and gather rays", "spherical harmonics", "free-camera error")
@@ -81,10 +83,6 @@ class ProbesMethod:
         """Build the acceleration structure of the triangles."""
         self._views.prepare(scene)
 
-    def open(self, store: StoreReader, key: str, cache: Cache) -> BakedFreeCamera:
-        """Open a free camera with environment, local lights and indirect light. See `TransferMethod`."""
-        return replace(BakedFreeCamera.from_store(store, key, cache), free_camera_error=read_free_camera_error(store))
-
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Return upper bounds, from the recipe alone."""
         plan_estimates.check_gathering(recipe, _MAX_REQUESTED_PATCHES)
@@ -96,9 +94,7 @@ class ProbesMethod:
         num_patch_points = POINTS_PER_PATCH * num_patches
         num_nodes = max_grid_nodes(plan_estimates.num_triangles(scene), recipe.num_probes)
         textures = plan_estimates.texture_bytes(scene)
-        peak_task_bytes = max(
-            num_nodes * _NODE_BUILD_BYTES, free_camera_error.BYTES + num_probes * free_camera_error.PROBE_BYTES
-        )
+        peak_task_bytes = max(num_nodes * _NODE_BUILD_BYTES, _ERROR_BYTES + num_probes * _ERROR_PROBE_BYTES)
         num_rays = num_probes * (recipe.num_lights + rays) + num_patch_points * (
             recipe.num_lights + RAYS_PER_PATCH_POINT
         )
@@ -173,7 +169,7 @@ class ProbesMethod:
             )
             return TaskOutput(make_harmonic_light(store, int(scene.id[:7], 16)) | mirror_light_arrays, 0, 0.0)
         if task.group == "free-camera error":
-            return TaskOutput({FREE_CAMERA_ERROR: free_camera_error.measure_error(store, scene, recipe.size)}, 0, 0.0)
+            return TaskOutput({FREE_CAMERA_ERROR: _measure_error(store, scene, recipe.size)}, 0, 0.0)
         if task.group not in ("patches", "probes"):
             raise ValueError(f"{task.group!r} is not in the stage")
         return self._bake_rows(scene, recipe, task, store)
@@ -235,6 +231,12 @@ class ProbesMethod:
             f"{task.group}/gather_hits": gather_hits.patch.reshape(num_rows, -1),
         }
         return TaskOutput(arrays, visibility.num_rays + gather_hits.num_rays, visibility.trace_s + gather_hits.trace_s)
+
+
+def _measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> NDArray[np.float32]:
+    """Measure the pictures of a finished bake. They are loaded by name, for this task alone: pictures import bakes."""
+    measured: NDArray[np.float32] = import_module(_PICTURES).measure_error(store, scene, size)
+    return measured
 
 
 def _trace_visibility(

@@ -1,4 +1,4 @@
-"""Lights, patches and ray counts in the layout of a store."""
+"""Lights, alpha masks and ray counts in the layout of a store."""
 
 from __future__ import annotations
 
@@ -6,18 +6,12 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.texture_slots import TEXTURES
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.core.jackknife import JackknifeEstimate
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
-from relume.patches.patch_kdtree import PatchTree
-from relume.patches.patches import patch_sample_points
-from relume.radiosity.patch_irradiance import PatchLight
 from relume.raytrace.alpha_filter import AlphaTest
 from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks
-from relume.raytrace.gather_rays import make_pattern
-from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility_masks import RayCounts
 from relume.store.bake_protocol import StoreReader
 
@@ -48,43 +42,6 @@ def read_shadow_ray_directions(store: StoreReader) -> Shaped[F32, "M 3"]:
     if store.attributes["relightable"]:
         return read_tiles(store).centroids.astype(np.float32)
     return read_lights(store).direction
-
-
-def read_tree(store: StoreReader) -> PatchTree:
-    """Read the kd-tree over a store's patches."""
-    return PatchTree(*(store.read(f"patches/{name}") for name in PatchTree._fields))
-
-
-def read_patch_points(store: StoreReader, start: int = 0, stop: int | None = None) -> SurfacePoints:
-    """Read the sample points of patches [start, stop) of a store, patch by patch."""
-    position, normal = (store.read(f"patches/{name}", start, stop) for name in ("position", "normal"))
-    return patch_sample_points(position, normal, start)
-
-
-def read_patches(store: StoreReader) -> PatchLight:
-    """Read the patches of a store."""
-    points, visible = read_patch_points(store), store.read("patches/visibility")
-    gather_hits, material = store.read("patches/gather_hits"), store.read("patches/material")
-    points_per_patch = store.shape("patches/normal")[1]
-    return PatchLight(
-        points,
-        visible.reshape(len(material), points_per_patch, visible.shape[1] // points_per_patch),
-        gather_hits,
-        make_pattern(gather_hits.shape[1] // points_per_patch, 0, int(store.attributes["gather_seed"])),
-        material,
-        np.stack([store.read(f"patches/{texture}") for texture in TEXTURES]),
-        _read_optional(store, "patches/uv"),
-        _read_optional(store, "patches/surface_normal"),
-    )
-
-
-def _read_optional(store: StoreReader, path: str) -> F32 | None:
-    """Read an array that stores of earlier versions lack; None for those."""
-    try:
-        store.shape(path)
-    except StoreError:
-        return None
-    return np.asarray(store.read(path), np.float32)
 
 
 def has_alpha_tested_surfaces(store: StoreReader) -> bool:

@@ -37,8 +37,7 @@ from relume.camera.transparency_layers import has_layers
 from relume.camera.view_samples import BACKGROUND, camera_setup, sample_pixels
 from relume.core.errors import PlanError
 from relume.lights.sphere_tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
-from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
-from relume.look import default_look
+from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
 from relume.methods import plan_estimates
 from relume.methods.read_cache import ReadCache
 from relume.methods.store_layout import SHARD_ROWS, read_lights, read_shadow_ray_directions
@@ -64,7 +63,7 @@ class ViewStage(NamedTuple):
     """Results of the first stage that every task of the second needs.
 
     Attributes:
-        targets: of shadow rays. num_surface_samples: of each view.
+        targets: targets of shadow rays. num_surface_samples: number of surface samples of each view.
     """
 
     targets: LightTargets
@@ -141,7 +140,6 @@ class SampledViews:
             "size": list(recipe.size),
             "num_lights": recipe.num_lights,
             "relightable": recipe.relightable,
-            "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
             "has_alpha_test": any(material.is_alpha_tested for material in scene.materials),
@@ -250,7 +248,7 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     """Return the light triangles of a scene's environment, as arrays of a store."""
     radiance = scene.environment.radiance
     tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
-    lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance))
+    lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance))
     return {
         "lights/nodes": lights.nodes,
         "lights/direction": lights.direction,

@@ -58,8 +58,8 @@ class EditBasis(Protocol):
         """Return a function that computes the operator's columns at samples [start, stop), called in several threads.
 
         Args:
-            bands: of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of the
-                affected ones do not matter.
+            bands: bands of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of
+                the affected ones do not matter.
             lights, receivers: incident light, and its receivers.
         """
         ...

@@ -8,7 +8,6 @@ version saves its first. Files may be lost at any time: what is missing or damag
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 from collections.abc import Callable, Hashable
 from contextlib import suppress
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from relume.core.digest import digest
 from relume.core.errors import RelumeError
 from relume.core.filesystem import atomic_write
 from relume.operators.shade import ShadedTerm
@@ -50,7 +50,7 @@ class ImageFiles:
         return self._path(key).exists()
 
     def _path(self, key: Hashable) -> Path:
-        return self._folder / (hashlib.sha256(repr(key).encode()).hexdigest()[:32] + ".npy")
+        return self._folder / (digest(key) + ".npy")
 
     def _write(self, path: Path, shaded: ShadedTerm) -> None:
         if not self._folder.exists():

@@ -1,4 +1,4 @@
-"""Operator from the outgoing light of patches to the image of one term, in few wavelet coefficients.
+"""Wavelet operator of indirect light: from the radiance of patches to the image of one term, in few Haar coefficients.
 
     R(x) = c(γ) · Tʷ(x) · Lʷ                                        eq. 9, Nguyen 2010
 
@@ -48,8 +48,8 @@ class IndirectOperator:
 
     Attributes:
         coefficients: indices of the Haar coefficients of each block of samples.
-        scale: of their quantized weights. weights: one channel if all are equal, else three.
-        num_samples: of the image, without the padding of the last block.
+        scale: scale of their quantized weights. weights: one channel if all are equal, else three.
+        num_samples: number of samples of the image, without the padding of the last block.
         neighbor_weights: filter weights of neighboring samples.
     """
 
@@ -118,7 +118,7 @@ def precompute_rows(
     """Contract all curves of a term along the gather rays of points.
 
     Args:
-        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
+        bands: bands of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
         receivers: their light is not used. rays: of these; their outgoing light is not used.
         expected: from `expected_light`.
         progress: called with the completed fraction. is_canceled: polled.

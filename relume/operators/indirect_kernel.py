@@ -44,7 +44,7 @@ def sum_by_patch(gather_hits, start, stop, patch_row, weight, sums):  # type: ig
 
     Args:
         gather_hits: patches that rays hit. (n, rays) uint16. patch_row: from `number_patches`. (patches,) int32
-        weight: of the rays, in the order of `list_gather_rays`. (channels, K) float32
+        weight: weights of the rays, in the order of `list_gather_rays`. (channels, K) float32
         sums: added to. (patches hit, channels, samples) float32
     """
     ray_index = 0
@@ -62,8 +62,8 @@ def transform(patches, sums, num_levels, index, details):  # type: ignore[no-unt
     """Compute the Haar coefficients of sparse columns; both arguments are overwritten.
 
     Args:
-        patches: nonzero patches, ascending. (n,) int32. sums: their values. (n, width) float32. num_levels: of all
-            patches, padded.
+        patches: nonzero patches, ascending. (n,) int32. sums: their values. (n, width) float32.
+        num_levels: number of levels of all patches, padded.
     Writes index (≥ m,) and details (≥ m, width); returns m.
     """
     num, end = patches.shape[0], 0
@@ -99,7 +99,8 @@ def select_coefficients(index, details, expected, coefficients, scale, rows):  #
     """Select the coefficients that change the samples most, as 16-bit weights.
 
     Args:
-        index: of coefficients. (m,) details: (m, width). expected: of the light's. (padded patches,) float32
+        index: indices of the coefficients. (m,) details: (m, width).
+        expected: expected magnitudes of the light's coefficients. (padded patches,) float32
     Writes coefficients (K,) int32, scale (K,) float32, rows (K, width) int16; zero if there are fewer than K.
     """
     importance = np.empty(index.shape[0], np.float32)

@@ -35,7 +35,7 @@ class Compression(NamedTuple):
 
     Attributes:
         step: one sample per block of step × step pixels; 1: all.
-        bits: of a value: 32, or 16 for integers with a scale per column and block of samples.
+        bits: size of a value: 32, or 16 for integers with a scale per column and block of samples.
         has_merged_lights: computed from merged lights.
     """
 
@@ -49,7 +49,7 @@ class Interpolation(NamedTuple):
 
     Attributes:
         num_selected: number of selected samples. neighbors: those around each sample.
-        weight: of these; rows sum to one.
+        weight: weights of these; rows sum to one.
     """
 
     num_selected: int
@@ -70,7 +70,7 @@ class LinearOperator:
         importance: norm of each column over all samples; (3, J), or (L, 3, J) over those of each level.
         bounds: ranges of the levels' samples, if coefficients depend on the level.
         scale: factors of 16-bit values; None for float32.
-        interpolation: of the columns' samples; None: they are all samples.
+        interpolation: interpolation from the columns' samples; None: they are all samples.
         has_merged_lights: computed from merged lights.
     """
 
@@ -151,7 +151,7 @@ def operator_bytes(num_samples: int, num_bands: int, bits: int = 32, num_selecte
     """Return the memory of an operator.
 
     Args:
-        num_samples: of the term. num_bands: columns per channel. bits: see `Compression`.
+        num_samples: number of samples of the term. num_bands: columns per channel. bits: see `Compression`.
         num_selected: samples of the columns; None: all.
     """
     tiles, samples = tile_layout(num_samples if num_selected is None else num_selected)
@@ -223,7 +223,7 @@ def level_bounds(
     """Return the L + 1 bounds of the levels' samples, if free curves depend on the level; else None.
 
     Args:
-        receivers: sorted by level. bands: of all curves. free_curves: names of the free curves.
+        receivers: sorted by level. bands: bands of all curves. free_curves: names of the free curves.
     """
     num_of_levels = num_levels({name: bands[name] for name in free_curves})
     if num_of_levels == 1 or receivers.level is None:

@@ -21,7 +21,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.curves import curve_bands, drawn_curves
+from relume.brdf.curve_edits import drawn_curves
+from relume.brdf.curves import curve_bands
 from relume.brdf.parameter_sweep import curves_of_parameter, slider_values, solid_angles
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
@@ -50,7 +51,7 @@ class ParameterOperator:
     Attributes:
         fixed_settings: other parameters of the same curves, with their values.
         curves: affected by the parameter.
-        nodes: of R, G and B, equally many; products of the affected curves (`_product`).
+        nodes: nodes of R, G and B, equally many; products of the affected curves (`_product`).
     """
 
     model: str
@@ -179,7 +180,7 @@ def _choose_channel_nodes(num: int, values: F64, rows: Sequence[F64], weights: F
     """Choose nodes per channel, as few as suffice and equally many; None if `MAX_NODES` do not suffice.
 
     Args:
-        rows: of each curve, at the values and between them. (2 n − 1, 3, J) each
+        rows: rows of each curve, at the values and between them. (2 n − 1, 3, J) each
     """
     products = [np.array([_product(bands) for bands in zip(*(r[:, c] for r in rows), strict=True)]) for c in range(num)]
 

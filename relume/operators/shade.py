@@ -73,7 +73,7 @@ def shade_rows(
     """Contract all curves of a term at receivers [start, stop).
 
     Args:
-        contractions: of the term's curves, none of them free, from `contract_levels`.
+        contractions: contractions of the term's curves, none of them free, from `contract_levels`.
         lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`.
     """
     if term.texels is not None and receivers.uv is not None:
@@ -118,7 +118,8 @@ class PartialImage:
         """Shade the missing samples.
 
         Args:
-            term: of the image. bands: of its curves, as in `shade`. lights, receivers: incident light, and receivers.
+            term: term of the image. bands: bands of its curves, as in `shade`.
+            lights, receivers: incident light, and receivers.
             progress: called with the completed fraction. is_canceled: polled.
             target_rows: samples to shade, with others of the same ranges; None: all.
         Raises:
@@ -143,7 +144,7 @@ def shade(
     """Contract all curves of a term.
 
     Args:
-        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
+        bands: bands of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
         lights, receivers: incident light, and its receivers.
         progress: called with the completed fraction. is_canceled: polled.
     Raises:

@@ -31,7 +31,7 @@ class BtfIncidentLight:
 
     Attributes:
         light: see `relume.transport.texture_light`.
-        rotation: of the texture that defines the frames, radians.
+        rotation: rotation of the texture that defines the frames, radians.
     """
 
     light: Shaped[F32, "n 3 L"]

@@ -57,7 +57,7 @@ def tile_offset(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
     """Return the range of a level's samples in a tile; empty if the end is not above the begin.
 
     Args:
-        bounds: see `stream`. level, tile: their indices. samples: of a tile.
+        bounds: see `stream`. level, tile: their indices. samples: samples of a tile.
     """
     return max(bounds[level] - tile * samples, 0), min(bounds[level + 1] - tile * samples, samples)
 
@@ -101,8 +101,8 @@ def stream(
     """Add T · Δc to an image, in place. Reads 4 · count · tiles · samples bytes per channel; memory-bound.
 
     Args:
-        transport: of the operator. columns: from `changed_columns`.
-        image: added to. bounds: of the levels' samples, tile by tile; None for a single level.
+        transport: transport of the operator. columns: from `changed_columns`.
+        image: added to. bounds: bounds of the levels' samples, tile by tile; None for a single level.
     """
     if columns.count.any():
         if bounds is None:
@@ -166,8 +166,8 @@ def stream_quantized(
     Reads 2 · count · tiles · samples bytes per channel; memory-bound.
 
     Args:
-        transport: quantized. scale: of its blocks. columns: from `changed_columns`.
-        image: added to. bounds: of the levels' samples, tile by tile; None for a single level.
+        transport: quantized. scale: scale of its blocks. columns: from `changed_columns`.
+        image: added to. bounds: bounds of the levels' samples, tile by tile; None for a single level.
     """
     if columns.count.any():
         if bounds is None:
@@ -204,6 +204,6 @@ def interpolate(
 
     Args:
         rows: values of the selected samples, C order. neighbors: selected samples for each of n samples.
-        weight: of these. image: added to; holds n samples.
+        weight: weight of these. image: added to; holds n samples.
     """
     parallel_for_chunks(lambda start, stop: _interpolate(rows, neighbors, weight, image, start, stop), len(image))

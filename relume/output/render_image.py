@@ -9,15 +9,14 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import PlanError
-from relume.live.fixed_camera.finish import render_exact
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.fixed_camera.protocols import FixedViewTransfer, OpenBake
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refinement.refinement_jobs import StaticViewState
+from relume.live.free_camera.static_view_jobs import StaticViewState
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import Look
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.static_view import StaticViewBuilder
 from relume.scene.model import Camera
 
 
@@ -40,8 +39,8 @@ def render_image(
         size: width and height; None means the baked size, the only one possible for a fixed camera.
         progress: called with the approximate finished fraction. is_canceled: called regularly.
         for_display: coverage is for compositing of display values, as in PNG and WebP.
-        camera_and_size: for a bake with a free camera: another camera than the view's, and the size of the image.
-        static_views: for such a bake: makes the image exact; None: it equals the free-camera image.
+        camera_and_size: for a bake with a free camera, another camera than the view's, and the size of the image.
+        static_views: for such a bake, static views that make the image exact; None: the image is the free-camera image.
     Returns:
         Linear radiance; for a transparent background, coverage as a fourth channel, with premultiplied color.
     Raises:
@@ -78,7 +77,7 @@ def render_small(
 
     Args:
         transfer: an opened bake. view_name: one of its views. look: the look.
-        width: of the small image.
+        width: width of the small image.
     Returns:
         Linear radiance, at least `width` wide if the bake is.
     """

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import pack_reflectance, scatters_diffusely, unpack_reflectance
+from relume.brdf.albedo import material_reflectance, scatters_diffusely
 from relume.brdf.texture_slots import TEXTURES, user_images
 from relume.core.color import srgb_encode
 from relume.images.image_store import load_texture
@@ -34,7 +34,7 @@ class Viewport:
     """A scene for camera placement.
 
     Attributes:
-        colors: of the materials, linear.
+        colors: colors of the materials, linear.
         default_camera: a camera that frames the scene. bounds_min, bounds_max: corners of its bounds, meters.
     """
 
@@ -102,9 +102,8 @@ class Viewport:
 
 def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
     """Approximate color of a material: its diffuse color, else that of its highlights. (3,)"""
-    constant, *textured_reflectances = unpack_reflectance(pack_reflectance(list(filter(scatters_diffusely, terms))))[
-        ..., 0
-    ].astype(np.float64)
+    diffuse = material_reflectance(list(filter(scatters_diffusely, terms)))
+    constant, *textured_reflectances = diffuse.matrix[..., 0].astype(np.float64)
     scene_textures = [material.textures.get(channel) for channel in TEXTURES]
     textures = [scene_textures[k] if name is None else load_texture(name) for k, name in enumerate(user_images(terms))]
     color = constant + sum(

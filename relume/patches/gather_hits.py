@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.patches.patch_kdtree import NO_PATCH_NODE, PatchTree, locate
-from relume.raytrace.embree import intersect, packet_arguments
 from relume.raytrace.gather_rays import RayPattern, cosine_ray, glossy_ray, lattice_offsets
 from relume.raytrace.ray_packet import (
     LANES,
@@ -40,8 +39,8 @@ class GatherHits:
     """Hits of the gather rays of n points.
 
     Attributes:
-        patch: that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
-        num_rays: traced. trace_s: wall time of the tracing alone.
+        patch: index of the patch that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
+        num_rays: number of traced rays. trace_s: wall time of the tracing alone.
     """
 
     patch: Shaped[NDArray[np.uint16], "n rays"]
@@ -116,14 +115,12 @@ def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untype
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(  # type: ignore[no-untyped-def]
-    intersect, scene, arguments, points, wo, surfaces, tree, pattern, start, stop, gather_hits
-):
+def _trace(tracer, points, wo, surfaces, tree, pattern, start, stop, gather_hits):  # type: ignore[no-untyped-def]
     """Trace all rays of points [start, stop), the same ray of `LANES` points at once; return their number.
 
     surfaces: normal, and index of the front side, of each face.
     """
-    packet = new_packet(scene, arguments)
+    packet = new_packet(tracer)
     frame, local_wo = np.empty((3, 3, LANES), np.float32), np.empty((3, LANES), np.float32)
     offsets, keys = np.empty((2, 4, LANES), np.float32), np.zeros((6, LANES), np.float32)
     patches = np.empty(LANES, np.int32)
@@ -133,7 +130,7 @@ def _trace(  # type: ignore[no-untyped-def]
         _load_points(points, wo, pattern, first, width, packet, frame, local_wo, offsets)
         for ray in range(gather_hits.shape[1]):
             num_rays += _aim(pattern, ray, frame, local_wo, offsets, packet, width)
-            trace_hits(intersect, packet)
+            trace_hits(packet)
             _locate_hits(packet, surfaces, tree, keys, patches)
             for k in range(width):
                 gather_hits[first + k, ray] = patches[k]
@@ -146,23 +143,18 @@ def trace_gather_rays(
     """Trace all gather rays of points. O(n · rays · (log triangles + log patches)) time.
 
     Args:
-        geometry: the scene's triangles. tree: of the patches.
+        geometry: the scene's triangles. tree: kd-tree of the patches.
         points: ray origins; their seeds shift the pattern.
         wo: view directions, unit, world space; glossy rays are distributed about their mirror direction.
         pattern: ray directions of every point.
     """
     gather_hits = np.empty((points.num_points, pattern.num_rays), np.uint16)
-    arguments = packet_arguments(coherent=False)
     surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32)
+    args = geometry.embree.hit_tracer(coherent=False), points, wo, surfaces, tree, pattern
     counts: list[int] = []
 
     def kernel(start: int, stop: int) -> None:
-        counts.append(
-            _trace(
-                intersect, geometry.embree.handle, arguments.ctypes.data, points, wo, surfaces, tree, pattern,
-                start, stop, gather_hits,
-            )
-        )  # fmt: skip
+        counts.append(_trace(*args, start, stop, gather_hits))
 
     start_time = time.perf_counter()
     for_ranges(kernel, len(gather_hits), _POINTS_PER_RANGE)

@@ -46,7 +46,7 @@ class NeighborFilter(NamedTuple):
     """Filters for the light of gather rays; see `relume.views.gather_filter`.
 
     Attributes:
-        diffuse: for diffuse terms. highlights: for directional terms.
+        diffuse: weights for diffuse terms. highlights: weights for directional terms.
     """
 
     diffuse: FilterWeights

@@ -24,7 +24,7 @@ I32 = NDArray[np.int32]
 NO_PATCH = 65_535  # in 16-bit gather hits
 MAX_PATCHES = 65_535
 NO_PATCH_NODE = np.int32(-1 - NO_PATCH)  # a leaf without a patch
-# a patch with a larger extent of a normal component is split along it
+# a patch whose normals vary more in a component is split along it
 _MAX_NORMAL_EXTENT = np.float32(0.5)
 
 
@@ -33,9 +33,9 @@ class PatchTree(NamedTuple):
 
     Attributes:
         axis: 0 to 2 for a position component, 3 to 5 for a normal component.
-        value: smaller keys are in the first child, others in the second.
+        value: split value; smaller keys are in the first child, others in the second.
         children: nodes; −1 − c for patch c.
-        roots: of side s of mesh m at 2 m + s, with s = 1 for the back side.
+        roots: root nodes of side s of mesh m at 2 m + s, with s = 1 for the back side.
     """
 
     axis: Shaped[NDArray[np.uint8], " n"]
@@ -50,7 +50,7 @@ def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
 
     Args:
         tree: a `PatchTree`.
-        keys: position and normal of each. (6, `LANES`) float32
+        keys: position and normal of each point. (6, `LANES`) float32
         nodes: root of each point's side; replaced by its patch, `NO_PATCH` if there is none. (`LANES`,) int32
     """
     axes, values, children = tree.axis, tree.value, tree.children
@@ -186,7 +186,7 @@ def grow_tree(
     Args:
         keys: position and unit normal.
         reach: width of the footprint at each point, below which a ray does not resolve positions.
-        side: of each point, in [0, num_sides). num_sides: twice the number of meshes.
+        side: side of each point, in [0, num_sides). num_sides: twice the number of meshes.
         max_patches: at most `MAX_PATCHES`; fewer if points coincide, or more so that each side has one.
     Returns:
         The tree, and the points of each patch.

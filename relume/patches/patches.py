@@ -1,7 +1,7 @@
 """Surface patches, between which indirect light is solved (the gather samples of Nguyen 2010).
 
-A patch is a leaf of the tree over importance photons, so that patches are small where gather rays of the images arrive
-and light varies. A few of its photons are its sample points (sub-area samples): light that varies over a patch is
+A patch is a leaf of the tree over importons, so that patches are small where gather rays of the images arrive and
+light varies. A few of its importons are its sample points (sub-area samples): light that varies over a patch is
 averaged, and no point lies where no ray arrives, such as on a floor below a box.
 """
 
@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.patches.importons import trace_importons
 from relume.patches.patch_kdtree import MAX_PATCHES, PatchTree, grow_tree
-from relume.patches.photon_density import shoot_photons
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_interaction import surface_at
 from relume.raytrace.surface_points import SurfacePoints
@@ -25,7 +25,7 @@ from relume.scene.model import Scene
 F32 = NDArray[np.float32]
 
 POINTS_PER_PATCH = 4
-_PHOTONS_PER_PATCH = 16
+_IMPORTONS_PER_PATCH = 16
 _TEXTURE_ANGLE = 0.02  # filter width of textures, comparable to that of patches
 
 
@@ -34,7 +34,7 @@ class Patches:
     """Patches in the order of their tree.
 
     Attributes:
-        position: of the sample points, offset from the surface. normal: shading normals there.
+        position: positions of the sample points, offset from the surface. normal: shading normals there.
         diffuse, specular: texture channels, averaged over the points.
         material: index into the scene's materials.
         uv: coordinates, filter width and texture rotation, as in
@@ -78,13 +78,13 @@ def choose_patches(
     """Create about `num_patches` patches where gather rays of the views arrive; seeded by the scene alone.
 
     Args:
-        scene: of the views. geometry: its triangles.
+        scene: scene of the views. geometry: its triangles.
         views: names of the cameras. size: width and height of their images, pixels.
         num_patches: clamped to `MAX_PATCHES` less two for each mesh.
     """
     max_patches = min(num_patches, MAX_PATCHES - 2 * len(scene.meshes))
-    photons = shoot_photons(scene, geometry, views, size, _PHOTONS_PER_PATCH * max_patches)
-    hits, directions = photons.hits, photons.directions
+    importons = trace_importons(scene, geometry, views, size, _IMPORTONS_PER_PATCH * max_patches)
+    hits, directions = importons.hits, importons.directions
     normal = geometry.face_normals[hits.face]
     is_back_face = np.einsum("nc,nc->n", normal, directions) > 0
     normal[is_back_face] *= -1
@@ -92,15 +92,15 @@ def choose_patches(
     side = 2 * geometry.face_mesh[hits.face] + is_back_face.astype(np.int32)
     tree, patch_rows = grow_tree(
         np.concatenate([position, normal], axis=1),
-        photons.width * hits.distance,
+        importons.width * hits.distance,
         side.astype(np.int32),
         2 * len(scene.meshes),
         max_patches,
     )
-    # a patch's photons are sorted along the last split axis: an even stride spreads the points
+    # a patch's importons are sorted along the last split axis: an even stride spreads the points
     fractions = (np.arange(POINTS_PER_PATCH) + 0.5) / POINTS_PER_PATCH
     point_rows = np.array(
-        [photon_rows[(fractions * len(photon_rows)).astype(np.int64)] for photon_rows in patch_rows], np.int64
+        [importon_rows[(fractions * len(importon_rows)).astype(np.int64)] for importon_rows in patch_rows], np.int64
     ).reshape(-1)
     point_hits = hits.rows(point_rows)
     surface = surface_at(geometry, point_hits, directions[point_rows], scene.materials, _TEXTURE_ANGLE)

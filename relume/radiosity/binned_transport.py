@@ -39,7 +39,8 @@ def mean_incoming(
     """Average every basis function over the directions of rays that hit a patch; zero if none does.
 
     Args:
-        gather_hits: patches that rays hit. bins: their direction bins there. num_patches: of the scene.
+        gather_hits: patches that rays hit. bins: their direction bins there.
+        num_patches: number of patches of the scene.
     """
     counts = np.zeros((num_patches, SIDE * SIDE), np.float32)
     _count(gather_hits, bins, counts)
@@ -76,7 +77,7 @@ def incident_by_bins(
 
     Args:
         gather_hits: patches that rays hit. outgoing_bins, incident_bins: direction bins of the rays, there and here.
-        outgoing: of all patches. rows: patches that need coefficients.
+        outgoing: outgoing light of all patches. rows: patches that need coefficients.
     """
     irradiance = np.empty((len(gather_hits), 3), np.float32)
     binned_light = np.zeros((len(rows), 3, SIDE * SIDE), np.float32)

@@ -46,7 +46,7 @@ def irradiance(
     """Return the irradiance of points, with the cosine of each light's mean direction.
 
     Args:
-        normal: of the points, unit. visible: light m of a point in bit m & 7 of byte m >> 3.
+        normal: normal of the points, unit. visible: light m of a point in bit m & 7 of byte m >> 3.
         lights: the environment's triangles.
     """
     out = np.empty((len(normal), 3), np.float32)

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import Reflectances, quantized_reflectance, unpack_lobes, white_material_key
+from relume.brdf.albedo import Reflectances, quantized_reflectance, white_term
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.highlight_tables import lobe_table
 from relume.brdf.texture_slots import texture_slot
 from relume.math.direction_grid import NUM_DIRECTION_BINS, NUM_FINE_BINS
@@ -49,12 +50,12 @@ class HighlightTables(NamedTuple):
         """Tabulate the highlights of all materials.
 
         Args:
-            reflectances: of all materials. material: of each patch.
+            reflectances: reflectances of all materials. material: material index of each patch.
             textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
             energy_scale: factor on all outgoing light of a patch.
         """
-        documents = [unpack_lobes(entry) for entry in reflectances]
-        max_highlights, table_numbers = max(map(len, documents), default=0), dict[str, int]()
+        documents = [material_reflectance.lobes for material_reflectance in reflectances]
+        max_highlights, table_numbers = max(map(len, documents), default=0), dict[FrozenTerm, int]()
         table_index = np.full((len(documents), max_highlights), -1, np.int16)
         slot_index, color, reflectance = (
             np.zeros_like(table_index, np.intp),
@@ -63,9 +64,8 @@ class HighlightTables(NamedTuple):
         )
         for m, entry in enumerate(documents):
             for k, document in enumerate(entry):
-                table_index[m, k] = table_numbers.setdefault(
-                    white_material_key({**document, "texture": None}), len(table_numbers)
-                )
+                untextured = white_term({**document, "texture": None})
+                table_index[m, k] = table_numbers.setdefault(untextured, len(table_numbers))
                 color[m, k], slot_index[m, k] = document["color"], texture_slot(document)
                 reflectance[m, k] = quantized_reflectance(document)[:, 0]
         has_any = np.array([len(entry) > 0 for entry in documents])
@@ -78,7 +78,7 @@ class HighlightTables(NamedTuple):
             rows,
             table_index[material[rows]],
             (factor * color[material[rows]]).astype(np.float32),
-            _stack_tables([lobe_table(text) for text in table_numbers]),
+            _stack_tables([lobe_table(term) for term in table_numbers]),
             (factor * reflectance[material[rows]]).sum(axis=1).astype(np.float32),
         )
 

@@ -42,7 +42,7 @@ class DirectLobes(NamedTuple):
 
     Attributes:
         lights: triangles of the environment. visible: these lights from the sample points.
-        rays: of the same points, from local lights.
+        rays: rays of the same points, from local lights.
     """
 
     lights: TriangleLights | None = None
@@ -56,7 +56,7 @@ def outgoing_in_highlights(
     """Return the binned outgoing radiance by highlights, for each patch of `highlights`.
 
     Args:
-        patches: of the bake. highlights: of some patches. direct_lobes: their direct light.
+        patches: patches of the bake. highlights: highlights of some patches. direct_lobes: their direct light.
     """
     out = np.zeros((len(highlights.rows), 3, NUM_DIRECTION_BINS), np.float32)
     points = patches.points_of(highlights.rows)
@@ -119,8 +119,9 @@ def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # ty
     """Add the light triangles that are visible from the points of patches to bins.
 
     Args:
-        frames: of the patches. (G, 2, 3). normals: of their points. (G, P, 3). visible: from these. (G, P, bytes) uint8
-        direction, irradiance: of the lights. (M, 3)
+        frames: frames of the patches. (G, 2, 3). normals: normals of their points. (G, P, 3).
+        visible: from these. (G, P, bytes) uint8
+        direction, irradiance: directions and irradiance of the lights. (M, 3)
         bins: added to. (G, `NUM_REFLECTIONS`, `NUM_FINE_BINS`, 3)
     """
     num_points = normals.shape[1]
@@ -145,7 +146,7 @@ def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # ty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_ray_list(frames, points, first, wi, irradiance, bins):  # type: ignore[no-untyped-def]
-    """Add listed rays, weighted by the cosine, to bins. points: of the patches. wi: (3, K) local"""
+    """Add listed rays, weighted by the cosine, to bins. points: points of the patches. wi: (3, K) local"""
     num_points = points.normal.shape[0] // bins.shape[0]
     point_weight = np.float32(1 / num_points)
     for p in range(points.normal.shape[0]):
@@ -166,7 +167,7 @@ def _spread(bins, table_index, gain, tables, bin_permutation, out):  # type: ign
     Args:
         bins: light. (G, `NUM_REFLECTIONS`, `NUM_FINE_BINS`, 3). table_index: tables of each patch, −1 for none. (G,
             terms)
-        gain: of each. (G, terms, 3). tables: T of all highlights. (tables, `NUM_FINE_BINS`, 1 or 3,
+        gain: gain of each. (G, terms, 3). tables: T of all highlights. (tables, `NUM_FINE_BINS`, 1 or 3,
             `NUM_DIRECTION_BINS`)
         bin_permutation: see `reflected_bins`. out: added to. (G, 3, `NUM_DIRECTION_BINS`)
     """

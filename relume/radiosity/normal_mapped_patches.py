@@ -33,7 +33,7 @@ def normal_mapped_patches(
 
     Args:
         patches: as baked. normals: override of each material, None for none.
-        tracer: of the additional rays. is_canceled: polled.
+        tracer: tracer of the additional rays. is_canceled: polled.
     Returns:
         All patches, unchanged if the bake has no UV coordinates for them.
     Raises:
@@ -72,7 +72,7 @@ def _retrace(
     tracer: RayTracer,
     is_canceled: Callable[[], bool],
 ) -> PatchLight:
-    """Trace patches `rows` with perturbed normals. perturbed_points: of all patches."""
+    """Trace patches `rows` with perturbed normals. perturbed_points: perturbed points of all patches."""
     retraced = replace(
         patches, points=perturbed_points, visible=patches.visible.copy(), gather_hits=patches.gather_hits.copy()
     )

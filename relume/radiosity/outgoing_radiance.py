@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -24,7 +24,7 @@ class BinnedRadiance(NamedTuple):
     """Additional binned outgoing radiance of some patches.
 
     Attributes:
-        rows: these patches. radiance: of each.
+        rows: these patches. radiance: radiance of each.
     """
 
     rows: Shaped[NDArray[np.intp], " F"]
@@ -99,7 +99,7 @@ def first_bounce(
     """Reflect incident light once.
 
     Args:
-        reflectance_operator: of the patches. incident: light at the patches.
+        reflectance_operator: reflectance operator of the patches. incident: light at the patches.
         outgoing_highlights: light reflected by sharp highlights; None: these use the low-degree basis.
     """
     isotropic, coefficients = reflectance_operator.apply(incident)
@@ -117,7 +117,7 @@ def first_bounce(
     )
 
 
-def pad(radiance: Shaped[NDArray[np.floating[Any]], "patches 3"]) -> Shaped[F32, "padded 3"]:
+def pad(radiance: Shaped[NDArray[np.floating], "patches 3"]) -> Shaped[F32, "padded 3"]:
     """Extend the radiance of patches by black rows, up to row `NO_PATCH`."""
     out = np.zeros((NO_PATCH + 1, 3), np.float32)
     out[: len(radiance)] = radiance

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import Reflectances, unpack_images
+from relume.brdf.albedo import Reflectances
 from relume.images.image_store import load_texture
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.zernike import OUTGOING_DEGREE, recurrence
@@ -41,10 +41,10 @@ class PatchLight:
 
     Attributes:
         points: sample points, patch by patch. visible: lights from these.
-        gather_hits: of the points' gather rays. pattern: their directions, for one point.
+        gather_hits: gather hits of the points' gather rays. pattern: their directions, for one point.
         material: index into the scene's materials.
         textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
-        uv: of the points, for material map overrides, see `relume.patches.patches`; None if not stored.
+        uv: UV coordinates of the points, for material map overrides, see `relume.patches.patches`; None if not stored.
         surface_normal: normals without normal mapping, for overrides; None if not stored.
     """
 
@@ -100,7 +100,7 @@ class PatchLight:
 
     def _texture_multipliers(self, reflectances: Reflectances) -> F32:
         """Return texture multipliers, with the look's material map overrides. (2, C, 3) float32"""
-        image_names = [unpack_images(material_reflectance) for material_reflectance in reflectances]
+        image_names = [material_reflectance.images for material_reflectance in reflectances]
         if not any(map(any, image_names)):
             return self.textures
         multipliers = self.textures.copy()
@@ -136,7 +136,7 @@ class PatchLight:
         """Return the light visibility of the points of patches `rows`.
 
         Args:
-            rows: the patches. light_indices: of the bake's lights; None: all.
+            rows: the patches. light_indices: light indices of the bake's lights; None: all.
         """
         visible = self._select_visible(self.visible[rows].reshape(-1, self.visible.shape[2]), light_indices)
         return np.ascontiguousarray(visible.reshape(len(rows), self.points_per_patch, visible.shape[1]))
@@ -157,7 +157,7 @@ class PatchLight:
         Args:
             rows: the patches. lights: triangles of the environment.
             degree: at most `OUTGOING_DEGREE`; coefficients of higher functions are zero.
-            light_indices: of the lights in the bake; None: all.
+            light_indices: light indices of the lights in the bake; None: all.
         """
         points, visible = (
             self.first_points(rows),
@@ -212,7 +212,7 @@ class PatchLight:
         """Return the incident light from other patches with directional light.
 
         Args:
-            outgoing: of all patches. rows: patches that need coefficients.
+            outgoing: outgoing light of all patches. rows: patches that need coefficients.
             is_binned: approximates directions by bins, see `relume.radiosity.binned_transport`.
         """
         if is_binned:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import PAIRS, Reflectances, unpack_reflectance
+from relume.brdf.albedo import PAIRS, Reflectances
 from relume.math.zernike import OUTGOING_DEGREE, recurrence
 
 F32 = NDArray[np.float32]
@@ -69,10 +69,10 @@ class ReflectanceOperator:
         """Compute F of patches.
 
         Args:
-            reflectances: of all materials. material: of each patch.
+            reflectances: reflectances of all materials. material: material index of each patch.
             textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
         """
-        matrices = np.stack([unpack_reflectance(material_reflectance) for material_reflectance in reflectances])
+        matrices = np.stack([material_reflectance.matrix for material_reflectance in reflectances])
         multipliers = np.concatenate([np.ones_like(textures[:1]), textures])
         total_reflectance = np.einsum("tnc,ntc->nc", multipliers, matrices[material, :, :, 0])
         has_lobe = np.abs(matrices[:, :, :, 1:]).max(axis=(1, 2, 3)) > 0

@@ -55,7 +55,7 @@ def solve_bounces(
     """Return the outgoing radiance of all patches by bounces `first` to `last`.
 
     Args:
-        patches: of the bake. reflectance_operator: of the patches.
+        patches: patches of the bake. reflectance_operator: reflectance operator of the patches.
         incident: direct light. first: at least 1. last: at least `first`.
         outgoing_highlights: sharp highlights and their direct light; None: these use the low-degree basis.
         directions: of light between patches.

@@ -1,9 +1,10 @@
 """Embree filter function for alpha-tested, blended and glass surfaces.
 
-One function for all such triangles of a scene; Embree calls it with the hits of a packet, and it rejects hits. A
-blended surface stops a fraction of rays equal to its opacity. A ray's alpha sample decides: the caller gives camera
-rays stratified samples, so that the rays of a pixel divide by opacity; for other rays it is a hash of the direction, so
-that a ray has the same result in any packet. Rays with a given alpha sample always hit glass.
+Embree calls one function for all such triangles of a scene, with the hits of a packet; it rejects the hits that the
+rays pass. A blended surface stops a fraction of the rays equal to its opacity, by comparison with each ray's alpha
+sample. Camera rays have stratified samples, so that the right fraction of a pixel's rays stops; the sample of any other
+ray is a hash of its direction, so that the result does not depend on the packet. Rays with a given alpha sample always
+hit glass.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class AlphaTest(NamedTuple):
     """Data of the filter function; it must live as long as its Embree scene.
 
     Attributes:
-        addresses: of the arrays below and of the arrays of `alpha_masks`.
+        addresses: addresses of the arrays below and of the arrays of `alpha_masks`.
         image: row of `AlphaMasks.images` of each triangle, −1 if it is opaque.
         sheet: triangles with the same number share one hash: all of an image, but each piece of glass has its own.
         faces: corner indices. uvs: texture coordinates of the corners.
@@ -83,7 +84,7 @@ class AlphaTest(NamedTuple):
         """Collect the data of the filter function.
 
         Args:
-            faces: indices into `positions` and `uvs`. positions, uvs: of the vertices.
+            faces: indices into `positions` and `uvs`. positions, uvs: positions and UV coordinates of the vertices.
             face_material: index into `alpha_masks.material_rule`. alpha_masks: the images.
         """
         image = np.ascontiguousarray(alpha_masks.material_rule[face_material], np.int32)
@@ -187,7 +188,7 @@ def _glass_transmittance(rule, alpha_sample):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _ignores_glass(group, alpha_sample):  # type: ignore[no-untyped-def]
-    """True if glass passes all rays with this alpha sample. group: of its tint, see `tint_groups`."""
+    """True if glass passes all rays with this alpha sample. group: group index of its tint, see `tint_groups`."""
     return alpha_sample == IGNORE_GLASS or (
         group > 0 and alpha_sample <= _NO_GROUP and np.float32(group) <= _NO_GROUP - alpha_sample
     )
@@ -195,7 +196,7 @@ def _ignores_glass(group, alpha_sample):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _passes_fraction(group, alpha_sample):  # type: ignore[no-untyped-def]
-    """True if glass passes a fraction of the rays with this alpha sample, otherwise none. group: of its tint."""
+    """True if glass passes a fraction of the rays with this alpha sample, otherwise none. group: its tint group."""
     return (
         alpha_sample == 0 or _LAST_CHANNEL <= alpha_sample < IGNORE_GLASS or (alpha_sample <= _NO_GROUP and group == 0)
     )

@@ -23,10 +23,10 @@ class FacePoints(NamedTuple):
 
     Attributes:
         is_hit: false if a ray hits nothing; the other fields are then of the first triangle.
-        p, uvs: corners.
+        p, uvs: positions and UV coordinates of the triangles' corners.
         face_normal: toward the visible side.
-        position: off the surface. normal: shading normals.
-        tangents: with the sign of the bitangent.
+        position: positions, offset from the surface. normal: shading normals.
+        tangents: tangents with the sign of the bitangent.
         uv: texture coordinates.
     """
 
@@ -42,7 +42,7 @@ class FacePoints(NamedTuple):
 
     @classmethod
     def from_hits(cls, geometry: SceneBuffers, hits: Hits, directions: Shaped[F32, "n 3"]) -> FacePoints:
-        """Compute the points of hits. geometry: the triangles. directions: of the rays"""
+        """Compute the points of hits. geometry: the triangles. directions: directions of the rays"""
         corners = geometry.faces[np.maximum(hits.face, 0)]
         p, uvs = geometry.positions[corners], geometry.uvs[corners]
         face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -63,7 +63,7 @@ class FacePoints(NamedTuple):
         """Side of a pixel's footprint in texture space, from the ratio of the triangle's areas there and in the world.
 
         Args:
-            distance, directions: of the rays. pixel_angle: angle of a pixel, radians.
+            distance, directions: distances and directions of the rays. pixel_angle: angle of a pixel, radians.
         """
         (du_0, dv_0), (du_1, dv_1) = np.diff(self.uvs, axis=1).transpose(1, 2, 0)
         uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)

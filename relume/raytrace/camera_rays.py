@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, num_threads, parallel_for_chunks
-from relume.raytrace.embree import EmbreeScene, intersect, packet_arguments
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.ray_packet import (
     LANES,
     enable_first_lanes,
@@ -34,14 +33,13 @@ _RAYS_PER_RANGE, _RANGES_PER_THREAD = 8192, 4  # minimum; maximum: scheduling a 
 _BY_DIRECTION = np.float32(0)  # the alpha sample is a hash of the direction
 
 
-@dataclass(frozen=True)
-class Hits:
+class Hits(NamedTuple):
     """First hits of n rays.
 
     Attributes:
         face: index of the triangle, -1 if the ray leaves the scene.
         uv: barycentric coordinates of its second and third corner.
-        distance: along the unit direction; infinite if nothing is hit.
+        distance: distance along the unit direction; infinite if nothing is hit.
     """
 
     face: Shaped[NDArray[np.int32], " n"]
@@ -55,14 +53,14 @@ class Hits:
     @staticmethod
     def concatenate(batches: Sequence[Hits]) -> Hits:
         """Concatenate hits."""
-        return Hits(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Hits)))
+        return Hits(*map(np.concatenate, zip(*batches, strict=True)))
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
+def _trace(tracer, origins, directions, alpha_sample, start, stop, hits):  # type: ignore[no-untyped-def]
     """Trace rays [start, stop). origins, alpha_sample: of n rays, or one for all."""
     last_origin, last_alpha_sample = origins.shape[0] - 1, alpha_sample.shape[0] - 1
-    packet = new_packet(scene, arguments)
+    packet = new_packet(tracer)
     for k in range(LANES):  # Embree does not modify origins
         set_origin(packet, k, origins[0, 0], origins[0, 1], origins[0, 2])
     for first in range(start, stop, LANES):
@@ -74,12 +72,12 @@ def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start
                 set_origin(packet, k, origins[r, 0], origins[r, 1], origins[r, 2])
             set_direction(packet, k, directions[r, 0], directions[r, 1], directions[r, 2], np.float32(np.inf))
             enable_stochastic_alpha(packet, k, alpha_sample[min(r, last_alpha_sample)])
-        trace_hits(intersect, packet)
+        trace_hits(packet)
         for k in range(width):
             r = first + k
-            face[r], distance[r] = get_hit(packet, k)
-            if face[r] >= 0:  # otherwise the packet contains values of an earlier ray
-                uv[r, 0], uv[r, 1] = get_uv(packet, k)
+            hits.face[r], hits.distance[r] = get_hit(packet, k)
+            if hits.face[r] >= 0:  # otherwise the packet contains values of an earlier ray
+                hits.uv[r, 0], hits.uv[r, 1] = get_uv(packet, k)
 
 
 def trace_rays(
@@ -89,21 +87,16 @@ def trace_rays(
 
     Args:
         scene: the triangles. origin: (3,) or (n, 3). directions: unit.
-        alpha_sample: of each ray (n,), or one for all, in (0, 1] for blended surfaces or a constant of `alpha_filter`.
+        alpha_sample: alpha sample of each ray (n,), or one for all, in (0, 1] for blended surfaces or a constant of
+            `alpha_filter`.
     """
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
     is_coherent, alpha_samples = len(origins) == 1, np.atleast_1d(alpha_sample)
     hits = Hits(np.empty(n, np.int32), np.zeros((n, 2), np.float32), np.empty(n, np.float32))
-    arguments = packet_arguments(is_coherent)
-    for_ranges(
-        lambda start, stop: _trace(
-            intersect, scene.handle, arguments.ctypes.data, origins, directions, alpha_samples, start, stop,
-            hits.face, hits.uv, hits.distance,
-        ),
-        n,
-        max(_RAYS_PER_RANGE, n // (_RANGES_PER_THREAD * num_threads())),
-    )  # fmt: skip
+    args = scene.hit_tracer(coherent=is_coherent), origins, directions, alpha_samples
+    rays_per_range = max(_RAYS_PER_RANGE, n // (_RANGES_PER_THREAD * num_threads()))
+    for_ranges(lambda start, stop: _trace(*args, start, stop, hits), n, rays_per_range)
     return hits
 
 

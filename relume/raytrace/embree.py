@@ -1,7 +1,7 @@
 """Embree 4 through its C interface, for the packet calls that embreex's own wrapper does not offer.
 
-The embreex wheel bundles the library. Numba kernels receive `occluded` and `intersect` as first-class functions and
-call them without the interpreter, with `PACKET_WIDTH` rays per call.
+The embreex wheel bundles the library. Numba kernels receive the addresses of its functions in a `PacketTracer` and call
+them without the interpreter, with `PACKET_WIDTH` rays per call.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ import glob
 import os
 import weakref
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import embreex
 import embreex.rtcore
-import numba.experimental.function_type  # noqa: F401  (registers functions that are known by their addresses)
 import numpy as np
 from jaxtyping import Shaped
-from numba.core import types
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -29,8 +27,6 @@ _TRIANGLE, _INDEX_BUFFER, _VERTEX_BUFFER, _UINT3, _FLOAT3 = 0, 0, 1, 0x5003, 0x9
 _COHERENT, _FEATURE_TRIANGLE = 1 << 16, 2
 _BUILD_QUALITY_MEDIUM = 1
 _NATIVE_RAY16 = 34  # RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED
-
-PacketCall = types.void(types.int64, types.int64, types.int64, types.int64)
 
 
 def _open_library() -> ctypes.CDLL:
@@ -76,31 +72,26 @@ _property = _function("rtcGetDeviceProperty", ctypes.c_ssize_t, _POINTER, ctypes
 PACKET_WIDTH = 16 if _property(_device, _NATIVE_RAY16) else 8
 
 
-class _ByAddress(types.WrapperAddressProtocol):
-    """A C function that Numba calls by address; typed, so that compiled kernels are cached on disk."""
+class PacketTracer(NamedTuple):
+    """A trace call on a scene, for kernels.
 
-    def __init__(self, name: str) -> None:
-        self._address = ctypes.cast(getattr(_library, name), _POINTER).value
+    Attributes:
+        function: address of rtcOccluded or rtcIntersect for `PACKET_WIDTH` rays. scene: `EmbreeScene.handle`.
+        arguments: address of RTCOccludedArguments or RTCIntersectArguments.
+    """
 
-    def __wrapper_address__(self) -> int:
-        assert self._address is not None
-        return self._address
-
-    def signature(self) -> Any:
-        return PacketCall
-
-
-occluded = _ByAddress(f"rtcOccluded{PACKET_WIDTH}")
-intersect = _ByAddress(f"rtcIntersect{PACKET_WIDTH}")
+    function: int
+    scene: int
+    arguments: int
 
 
-def packet_arguments(coherent: bool) -> Shaped[NDArray[np.uint64], " 5"]:
-    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three null pointers."""
-    arguments = np.zeros(5, np.uint64)
-    halves = arguments.view(np.uint32)
-    halves[0] = _COHERENT if coherent else 0
-    halves[1] = _FEATURE_TRIANGLE
-    return arguments
+_occluded, _intersect = (
+    ctypes.cast(getattr(_library, f"rtc{name}{PACKET_WIDTH}"), _POINTER).value or 0
+    for name in ("Occluded", "Intersect")
+)
+# flags and feature mask, and three null pointers; incoherent rays, then coherent ones
+_ARGUMENTS = np.zeros((2, 5), np.uint64)
+_ARGUMENTS.view(np.uint32)[:, :2] = (0, _FEATURE_TRIANGLE), (_COHERENT, _FEATURE_TRIANGLE)
 
 
 _OMITTED_VERTEX = 0xFFFFFFFF  # an invalid index: Embree skips the triangle, and the others keep their indices
@@ -124,7 +115,7 @@ class EmbreeScene:
 
         Args:
             positions: finite. faces: vertex indices.
-            alpha_test: of triangles that are not opaque; None if all are.
+            alpha_test: filter for the triangles that are not opaque; None if all are opaque.
         Raises:
             SceneError: Embree rejected the geometry.
         """
@@ -140,6 +131,14 @@ class EmbreeScene:
         if error := _device_error(_device):
             raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")
         return cls(scene, alpha_test)
+
+    def shadow_tracer(self, *, coherent: bool) -> PacketTracer:
+        """Trace shadow rays. coherent: rays of a packet have similar directions."""
+        return PacketTracer(_occluded, self.handle, _ARGUMENTS[int(coherent)].ctypes.data)
+
+    def hit_tracer(self, *, coherent: bool) -> PacketTracer:
+        """Find first hits; see `shadow_tracer`."""
+        return PacketTracer(_intersect, self.handle, _ARGUMENTS[int(coherent)].ctypes.data)
 
     def __post_init__(self) -> None:
         weakref.finalize(self, _release_scene, self.handle).atexit = False

@@ -44,11 +44,11 @@ class RayPattern(NamedTuple):
     """Gather rays of every point, before their shift.
 
     Attributes:
-        uv: on the unit square; first the cosine rays, then the glossy rays.
+        uv: points on the unit square; first the cosine rays, then the glossy rays.
         rays: u, (1 + 1/ε)^u, cos 2πv and sin 2πv.
         num_cosine: number of cosine-distributed rays.
         sides: two edge vectors of a lattice cell for each of the two sets.
-        seed: of the shifts.
+        seed: seed of the shifts.
     """
 
     uv: Shaped[F32, "N 2"]
@@ -68,7 +68,7 @@ def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> RayPattern:
 
     Args:
         num_cosine: cosine-distributed rays, at least 1. num_glossy: rays around the mirror direction, or 0.
-        seed: of the shifts; only the lowest 31 bits count.
+        seed: seed of the shifts; only the lowest 31 bits count.
     Raises:
         PlanError: there are no rays, or more than `MAX_RAYS`.
     """
@@ -150,7 +150,7 @@ def glossy_pdf(cos_theta_h, cos_theta_d):  # type: ignore[no-untyped-def]
 def cosine_ray(ray, offset):  # type: ignore[no-untyped-def]
     """Direction of a cosine ray, in the frame x = tangent, y = n × t, z = n.
 
-    ray: a row of `RayPattern.rays`. offset: of the set, from `lattice_offsets`.
+    ray: a row of `RayPattern.rays`. offset: offset of the set, from `lattice_offsets`.
     """
     u = ray[0] + offset[0]
     u -= np.float32(u >= 1)
@@ -165,7 +165,7 @@ def glossy_ray(ray, offset, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Direction of a glossy ray in the same frame; rays below the horizon must not be traced.
 
     Args:
-        ray: a row of `RayPattern.rays`. offset: of the set, from `lattice_offsets`.
+        ray: a row of `RayPattern.rays`. offset: offset of the set, from `lattice_offsets`.
         ox, oy, oz: local wo, toward the viewer.
     """
     u, growth = ray[0] + offset[0], ray[1] * offset[1]
@@ -184,7 +184,7 @@ def local_ray(pattern, ray, offsets, ox, oy, oz):  # type: ignore[no-untyped-def
 
     Args:
         pattern: the rays of every point. ray: index of the ray.
-        offsets: of the point, from `lattice_offsets`. ox, oy, oz: local wo.
+        offsets: offsets of the point, from `lattice_offsets`. ox, oy, oz: local wo.
     """
     if ray < pattern.num_cosine:
         return cosine_ray(pattern.rays[ray], offsets[0])

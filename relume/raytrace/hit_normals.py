@@ -90,7 +90,7 @@ def normals_at(geometry: SceneBuffers, hits: Hits, directions: Shaped[F32, "n 3"
     """Interpolate normals at ray hits. Reference: `relume.raytrace.surface_interaction.surface_at` without materials.
 
     Args:
-        geometry: the triangles. hits: the first hits of rays. directions: of the rays, unit.
+        geometry: the triangles. hits: the first hits of rays. directions: directions of the rays, unit.
     Returns:
         Normals toward the viewer; the reversed direction for rays without a hit.
     """

@@ -3,7 +3,7 @@
 Successive points are neighbors in the image. In a block of 64, every fourth point is traced against all samples of the
 light. If all these rays agree, the light is visible or occluded for the other points too; otherwise all of them are
 traced. So shadow edges are traced, except for shadows so thin that no ray hits them: they appear when the light stops
-and `relume.raytrace.light_visibility` traces every ray.
+and `relume.raytrace.local_light_visibility` traces every ray.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, light_sample
-from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import cranley_patterson_offset
-from relume.raytrace.light_visibility import shadow_ray
+from relume.raytrace.local_light_visibility import shadow_ray
 from relume.raytrace.ray_packet import (
     LANES,
     enable_first_lanes,
@@ -58,10 +58,10 @@ def is_seed_sample(k):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _flush(occluded, packet, num_waiting, visible):  # type: ignore[no-untyped-def]
+def _flush(packet, num_waiting, visible):  # type: ignore[no-untyped-def]
     """Trace the rays in the first lanes; returns the number of rays that reach the light."""
     enable_first_lanes(packet, num_waiting)
-    trace_shadows(occluded, packet)
+    trace_shadows(packet)
     num_visible = 0
     for lane in range(num_waiting):
         is_lane_visible = is_unoccluded(packet, lane)
@@ -71,13 +71,13 @@ def _flush(occluded, packet, num_waiting, visible):  # type: ignore[no-untyped-d
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _trace_points(occluded, packet, position, alpha_sample, first, width, rays, contribution, are_seeds, visible):  # type: ignore[no-untyped-def]
+def _trace_points(packet, points, first, width, rays, contribution, are_seeds, visible):  # type: ignore[no-untyped-def]
     """Trace the rays with a contribution from the seed points of a block, or from its other points.
 
     Returns:
         Number of traced rays, and number of rays that reach the light.
     """
-    num_rays, num_visible = 0, 0
+    position, alpha_sample, num_rays, num_visible = points.position, points.alpha_sample, 0, 0
     for r in range(contribution.shape[0]):
         k = r & (BLOCK - 1)
         if k >= width or contribution[r] <= 0 or is_seed_sample(k) != are_seeds:
@@ -89,9 +89,9 @@ def _trace_points(occluded, packet, position, alpha_sample, first, width, rays, 
         set_direction(packet, lane, rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3])
         num_rays += 1
         if lane == LANES - 1:
-            num_visible += _flush(occluded, packet, LANES, visible)
+            num_visible += _flush(packet, LANES, visible)
     if num_rays & (LANES - 1):
-        num_visible += _flush(occluded, packet, num_rays & (LANES - 1), visible)
+        num_visible += _flush(packet, num_rays & (LANES - 1), visible)
     return num_rays, num_visible
 
 
@@ -113,11 +113,9 @@ def _aim(light, strata, surface_offset, points, first, width, rays, contribution
 
 
 @nb.njit(nogil=True, cache=True)
-def _light_block(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, light, strata, surface_offset, points, start, stop, irradiance, bits
-):
+def _light_block(tracer, light, strata, surface_offset, points, start, stop, irradiance, bits):  # type: ignore[no-untyped-def]
     """Compute the light at points [start, stop); start is a multiple of `BLOCK`."""
-    packet = new_packet(scene, arguments)
+    packet = new_packet(tracer)
     num_rays = BLOCK * strata.uv.shape[0]
     rays, contribution, visible = (
         np.empty((num_rays, 4), np.float32),
@@ -127,16 +125,12 @@ def _light_block(  # type: ignore[no-untyped-def]
     for first in range(start, stop, BLOCK):
         width = min(BLOCK, stop - first)
         _aim(light, strata, surface_offset, points, first, width, rays, contribution)
-        num_traced, num_visible = _trace_points(
-            occluded, packet, points.position, points.alpha_sample, first, width, rays, contribution, True, visible
-        )
+        num_traced, num_visible = _trace_points(packet, points, first, width, rays, contribution, True, visible)
         if num_traced > 0 and num_visible == 0:
             continue
         is_fully_lit = num_traced > 0 and num_visible == num_traced
         if not is_fully_lit:
-            _trace_points(
-                occluded, packet, points.position, points.alpha_sample, first, width, rays, contribution, False, visible
-            )
+            _trace_points(packet, points, first, width, rays, contribution, False, visible)
         for sample in range(strata.uv.shape[0]):
             byte, bit = sample >> 3, np.uint8(1 << (sample & 7))
             for k in range(width):
@@ -159,12 +153,11 @@ def trace_moving_light(
     """
     num, num_bytes = points.num_points, (len(strata.uv) + 7) // 8
     moving_light = MovingLight(np.zeros(num, np.float32), np.zeros((num, num_bytes), np.uint8))
-    arguments = packet_arguments(coherent=True)
-    args = (light, strata, np.float32(surface_offset), points)
+    args = scene.shadow_tracer(coherent=True), light, strata, np.float32(surface_offset), points
 
     def kernel(start: int, stop: int) -> None:
         first, last = start * BLOCK, min(stop * BLOCK, num)
-        _light_block(occluded, scene.handle, arguments.ctypes.data, *args, first, last, *moving_light)
+        _light_block(*args, first, last, *moving_light)
 
     parallel_for_chunks(kernel, -(-num // BLOCK))
     return moving_light

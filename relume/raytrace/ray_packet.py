@@ -6,14 +6,18 @@ inlined: calls would count references to the packet's arrays, and the loops over
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 from jaxtyping import Shaped
+from llvmlite import ir
+from numba.core import types
 from numpy.typing import NDArray
 
-from relume.raytrace.embree import PACKET_WIDTH
+from relume.core.simd import WORD, untyped_intrinsic
+from relume.raytrace.embree import PACKET_WIDTH, PacketTracer
 
 LANES = PACKET_WIDTH
 
@@ -33,15 +37,14 @@ class RayPacket(NamedTuple):
         words: the same memory.
         is_active: −1 if the ray of a lane is traced, else 0.
         owner: index of each lane's ray, for the caller.
-        scene, arguments: addresses of the scene and of `packet_arguments`.
+        tracer: what traces the rays.
     """
 
     rays: Shaped[NDArray[np.float32], " words"]
     words: Shaped[NDArray[np.uint32], " words"]
     is_active: Shaped[NDArray[np.int32], " lanes"]
     owner: Shaped[NDArray[np.int64], " lanes"]
-    scene: int
-    arguments: int
+    tracer: PacketTracer
 
 
 @nb.njit(nogil=True, cache=True)
@@ -53,16 +56,12 @@ def _aligned(num_words):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def new_packet(scene, arguments):  # type: ignore[no-untyped-def]
-    """Make a packet whose rays start at their origins and hit all triangles.
-
-    Args:
-        scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`, which the caller keeps alive.
-    """
+def new_packet(tracer):  # type: ignore[no-untyped-def]
+    """Make a packet whose rays start at their origins and hit all triangles. tracer: a `PacketTracer`."""
     rays = _aligned(_ROWS * LANES)
     words = rays.view(np.uint32)
     words[_MASK * LANES : (_MASK + 1) * LANES] = _INVALID_ID
-    return RayPacket(rays, words, _aligned(LANES).view(np.int32), np.zeros(LANES, np.int64), scene, arguments)
+    return RayPacket(rays, words, _aligned(LANES).view(np.int32), np.zeros(LANES, np.int64), tracer)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -101,16 +100,23 @@ def enable_first_lanes(packet, num):  # type: ignore[no-untyped-def]
         packet.is_active[lane] = -1 if lane < num else 0
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
-def _call(embree, packet):  # type: ignore[no-untyped-def]
-    """Call one of Embree's functions, which writes into the packet."""
-    embree(np.int64(packet.is_active.ctypes.data), packet.scene, np.int64(packet.rays.ctypes.data), packet.arguments)
+@untyped_intrinsic
+def _call(typing_context, function, is_active, scene, rays, arguments):  # type: ignore[no-untyped-def]
+    """Call one of Embree's functions by its address, which writes into the packet. All are addresses."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Sequence[ir.Value]) -> ir.Value:
+        kind = ir.FunctionType(ir.VoidType(), [WORD] * 4)
+        builder.call(builder.inttoptr(values[0], kind.as_pointer()), values[1:])
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 5), generate
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def trace_shadows(occluded, packet):  # type: ignore[no-untyped-def]
-    """Trace shadow rays of the active lanes. occluded: `relume.raytrace.embree.occluded`"""
-    _call(occluded, packet)
+def trace_shadows(packet):  # type: ignore[no-untyped-def]
+    """Trace shadow rays of the active lanes. The packet's tracer is from `EmbreeScene.shadow_tracer`."""
+    tracer, is_active, rays = packet.tracer, packet.is_active.ctypes.data, packet.rays.ctypes.data
+    _call(tracer.function, np.int64(is_active), tracer.scene, np.int64(rays), tracer.arguments)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -120,10 +126,10 @@ def is_unoccluded(packet, lane):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def trace_hits(intersect, packet):  # type: ignore[no-untyped-def]
-    """Find the first hits of the active lanes. intersect: `relume.raytrace.embree.intersect`"""
+def trace_hits(packet):  # type: ignore[no-untyped-def]
+    """Find the first hits of the active lanes. The packet's tracer is from `EmbreeScene.hit_tracer`."""
     packet.words[_GEOMETRY * LANES : (_INSTANCE + 1) * LANES] = _INVALID_ID
-    _call(intersect, packet)
+    trace_shadows(packet)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")

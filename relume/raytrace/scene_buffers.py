@@ -26,7 +26,8 @@ class SceneBuffers:
     """All meshes of a scene, merged.
 
     Attributes:
-        positions, normals, tangents, uvs: of the vertices; tangents have the sign of the bitangent.
+        positions, normals, tangents, uvs: positions, normals, tangents and UV coordinates of the vertices; tangents
+            have the sign of the bitangent. All but positions may be empty, for rays that only need the geometry.
         faces: vertex indices of the corners.
         face_material: index into the scene's materials.
         face_mesh: index into the scene's meshes.
@@ -34,9 +35,9 @@ class SceneBuffers:
     """
 
     positions: Shaped[F32, "vertices 3"]
-    normals: Shaped[F32, "vertices 3"]
-    tangents: Shaped[F32, "vertices 4"]
-    uvs: Shaped[F32, "vertices 2"]
+    normals: Shaped[F32, "shaded 3"]
+    tangents: Shaped[F32, "shaded 4"]
+    uvs: Shaped[F32, "shaded 2"]
     faces: Shaped[NDArray[np.uint32], "faces 3"]
     face_material: Shaped[NDArray[np.int32], " faces"]
     face_mesh: Shaped[NDArray[np.int32], " faces"]
@@ -67,9 +68,9 @@ class SceneBuffers:
         return is_front(self.embree, self.positions, self.faces, origin, points)
 
 
-def offset_point(positions: Shaped[F32, "n 3"]) -> float:
+def ray_epsilon(positions: Shaped[F32, "n 3"]) -> float:
     """Offset of ray origins from surfaces with these vertices, meters."""
-    # the rounding error of float32 grows with the distance from the world's origin, so that counts besides the size
+    # rounding of float32 grows with the distance from the world's origin, so the offset depends on it and on the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
 
 
@@ -84,7 +85,7 @@ def is_front(
 
     Args:
         embree: the triangles. positions: their vertices. faces: vertex indices.
-        origin: of the rays. (3,) or (n, 3). points: on triangles; the rays' targets.
+        origin: origins of the rays. (3,) or (n, 3). points: points on triangles; the rays' targets.
     """
     directions = (points - origin) / np.linalg.norm(points - origin, axis=1, keepdims=True)
     face = trace_rays(embree, origin, directions.astype(np.float32), IGNORE_GLASS).face
@@ -118,5 +119,5 @@ def build_scene_buffers(scene: Scene) -> SceneBuffers:
         face_material=face_material,
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
         embree=EmbreeScene.build(mesh_buffers.positions, mesh_buffers.faces, alpha_test),
-        epsilon=offset_point(mesh_buffers.positions),
+        epsilon=ray_epsilon(mesh_buffers.positions),
     )

@@ -33,7 +33,7 @@ def mapped_normal(
     """Transform tangent-space normals to world space; a normal below the face is replaced by `normal`.
 
     Args:
-        mapped: mean tangent-space normals. normal: of the surface, unit.
+        mapped: mean tangent-space normals. normal: normal of the surface, unit.
         tangents: not yet orthogonal to `normal`, with the sign of the bitangent. face_normal: unit.
     """
     tangent = project_to_tangent(tangents[:, :3], normal)
@@ -48,7 +48,7 @@ def flip_to_viewer(normal: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]) -
     """Bend shading normals that face away from the viewer just into view, so that no sample is lost.
 
     Args:
-        normal: unit. directions: of the camera rays, unit.
+        normal: unit. directions: directions of the camera rays, unit.
     """
     facing = -np.einsum("nc,nc->n", normal, directions)
     deficit = np.maximum(MIN_FACING - facing, 0)[:, None]

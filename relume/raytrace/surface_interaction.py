@@ -32,13 +32,14 @@ class SurfaceInteraction:
     """Surface points and texture values at n ray hits.
 
     Attributes:
-        points: with normals toward the viewer, off the surface by the scene's epsilon; their seeds are their indices.
+        points: points with normals toward the viewer, off the surface by the scene's epsilon; their seeds are their
+            indices.
         diffuse, specular: texture channels, 1 without a texture.
         uv: texture coordinates (u, v), side of the pixel's footprint in UV space, angle from the tangent to the u axis
             in radians, −1 if the texture is mirrored, else 1. Triangles without UV coordinates use tri-planar mapping
             in meters.
         roughness: relative to the material's terms, 1 without a roughness map.
-        normal_length: of the mean normal in the pixel, 1 without a normal map.
+        normal_length: length of the mean normal in the pixel, 1 without a normal map.
         emission: relative to the mean of the material's surfaces, 1 without an emission texture.
         surface_normal: normals without normal mapping, the base for overridden normal maps.
     """
@@ -73,7 +74,7 @@ def surface_at(
 
     Args:
         geometry: the triangles. hits: the first hits of n rays.
-        directions: of the rays, unit.
+        directions: directions of the rays, unit.
         materials: if given, textures and normal maps are evaluated, filtered over the pixel.
         pixel_angle: angle of a pixel, radians.
     Returns:
@@ -96,7 +97,8 @@ class _Textured(NamedTuple):
     """Texture values at n points.
 
     Attributes:
-        channels: of textures. (n, 3) each, roughness (n, 1). length: of the mean normal in the pixel. (n,)
+        channels: channels of textures. (n, 3) each, roughness (n, 1).
+        length: length of the mean normal in the pixel. (n,)
         normal: after normal mapping. (n, 3)
     """
 
@@ -108,7 +110,7 @@ class _Textured(NamedTuple):
     def sample(
         cls, face_points: FacePoints, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32
     ) -> _Textured:
-        """Look up textures. material: index, −1 for none. (n,) footprint: of a pixel in UV space. (n,)"""
+        """Look up textures. material: index, −1 for none. (n,) footprint: footprint of a pixel in UV space. (n,)"""
         channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
         channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
         length, normal = np.ones(len(face_points.uv), np.float32), face_points.normal
@@ -180,8 +182,8 @@ def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
     """Texture coordinates and orientation, without the footprint; see `SurfaceInteraction.uv`.
 
     Args:
-        p, uvs: corners of the triangles. (n, 3, 3), (n, 3, 2). uv: of the points. (n, 2)
-        normal, tangent: of the points. (n, 3) each
+        p, uvs: corners of the triangles. (n, 3, 3), (n, 3, 2). uv: UV coordinates of the points. (n, 2)
+        normal, tangent: normals and tangents of the points. (n, 3) each
     Returns:
         (n, 5); the last is 0 if a triangle has no area in UV space.
     """
@@ -210,7 +212,8 @@ def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32,
     """Texture coordinates of tri-planar mapping, one repeat per meter; see `SurfaceInteraction.uv`.
 
     Args:
-        position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, meters. (n,)
+        position, face_normal, normal, tangent: positions, face normals, normals and tangents of n points. (n, 3) each.
+        side: side length of a pixel there, meters. (n,)
     """
     u_axis, v_axis = triplanar_axes(face_normal)
     u, v = np.einsum("nc,nc->n", position, u_axis), -np.einsum("nc,nc->n", position, v_axis)

@@ -18,11 +18,12 @@ class SurfacePoints(NamedTuple):
     """n points on surfaces, for kernels.
 
     Attributes:
-        position: off the surface, so that rays can start there; meters.
+        position: positions, meters, offset from the surface so that rays can start there.
         normal: unit shading normals, on the visible side.
         tangent: unit, orthogonal to the normals; n × t completes the shading frame.
         seed: index of each point in its set; it determines the shift of ray patterns.
-        alpha_sample: for rays at blended surfaces, see `relume.raytrace.alpha_filter`; one each, or one for all.
+        alpha_sample: alpha samples for rays at blended surfaces, see `relume.raytrace.alpha_filter`; one each, or one
+            for all.
     """
 
     position: Shaped[F32, "n 3"]

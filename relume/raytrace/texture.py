@@ -130,14 +130,14 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
 def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
     """Find two adjacent texels for linear interpolation along one side of an image, and the weight of the second.
 
-    wrap: of `WRAPS`. coordinate: along the image's side, 0 to 1. size: texels along it.
+    wrap: one of `WRAPS`. coordinate: coordinate along the image's side, 0 to 1. size: texels along it.
     """
     if wrap == _REPEAT:
         # so that indices are out of range by at most one texel, and no division is needed
         coordinate -= math.floor(coordinate)
     texel_coordinate = coordinate * np.float32(size) - np.float32(0.5)
     below = math.floor(texel_coordinate)
-    first: Any = np.int64(below)
+    first = np.int64(below)
     second = first + 1
     if wrap == _REPEAT:
         return (

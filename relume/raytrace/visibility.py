@@ -1,4 +1,8 @@
-"""Visibility tracing from points to light triangles: one bit per pair, packets of 16 neighboring points per light."""
+"""Visibility of light triangles from any points: one bit per pair, traced in packets of 16 points per light.
+
+`relume.raytrace.visibility_masks` traces the bits of a bake's view samples, with fewer rays;
+`relume.raytrace.local_light_visibility` traces those of local lights.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
-from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.ray_packet import (
     FAR,
     LANES,
@@ -34,10 +38,10 @@ NO_EXCLUSION = np.zeros((1, 3), np.float32)  # a normal without any light above 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, origins, normals, excluded_normals, alpha_sample, directions, start, stop, bits
+    tracer, origins, normals, excluded_normals, alpha_sample, directions, start, stop, bits
 ):
     """Trace points [start, stop) against all lights; returns the number of rays. start is a multiple of 16."""
-    packet = new_packet(scene, arguments)
+    packet = new_packet(tracer)
     facing = np.empty(LANES, np.bool_)
     num_lights = directions.shape[0]
     num_rays = 0
@@ -63,7 +67,7 @@ def _trace(  # type: ignore[no-untyped-def]
             num_rays += num_active
             for k in range(LANES):
                 set_direction(packet, k, x, y, z, FAR)
-            trace_shadows(occluded, packet)
+            trace_shadows(packet)
             byte, bit = light >> 3, np.uint8(1 << (light & 7))
             for k in range(width):
                 if facing[k] and is_unoccluded(packet, k):
@@ -97,25 +101,19 @@ def trace_visibility(
 
     Args:
         scene: the occluding triangles.
-        origins: off the surface.
+        origins: positions, offset from the surface.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         directions: unit, toward the lights.
-        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+        alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.
         excluded_normals: other normals; lights above their horizon are not traced and count as occluded too.
     Cost: O(n · m · log triangles) time.
     """
     bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
-    arguments = packet_arguments(coherent=True)
+    args = scene.shadow_tracer(coherent=True), origins, normals, excluded_normals, alpha_sample, directions
     counts: list[int] = []
 
     def kernel(start: int, stop: int) -> None:
-        counts.append(
-            _trace(
-                occluded, scene.handle, arguments.ctypes.data, origins, normals, excluded_normals, alpha_sample,
-                directions,
-                start, stop, bits,
-            )
-        )  # fmt: skip
+        counts.append(_trace(*args, start, stop, bits))
 
     start_time = time.perf_counter()
     for_ranges(kernel, len(origins), _POINTS_PER_RANGE)
@@ -139,7 +137,7 @@ def select_visibility(
     """Select visibility bits of some points and some lights.
 
     Args:
-        visible: of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
+        visible: visibility bits of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
     Returns:
         Their bits, renumbered; ceil(N / 8) bytes
     """

@@ -39,7 +39,7 @@ U64 = NDArray[np.uint64]
 BLOCK = WORD_BITS
 _BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
-_MIN_FULL_LANES = LANES * 3 // 4  # rays to one light from which on they are traced without rays of the next light
+_MIN_FULL_LANES = LANES * 3 // 4  # with this many rays to one light, a packet is traced without rays of the next
 # predictions of the visibility of a light from the untraced samples of a region
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
 # one in this many predicted bits is traced as a check; a power of two, at least the size of a quarter
@@ -55,7 +55,7 @@ class _Block(NamedTuple):
 
     Attributes:
         facing_bits, traced_bits, visibility_bits: above the horizon; traced; unoccluded.
-        alpha_sample: for the rays of each sample at blended surfaces. Its size is `BLOCK`.
+        alpha_sample: alpha samples for the rays of each sample at blended surfaces. Its size is `BLOCK`.
     """
 
     facing_bits: Shaped[U64, " lights"]
@@ -68,7 +68,7 @@ class _Level(NamedTuple):
     """State of a level in its region.
 
     Attributes:
-        prediction: for untraced samples.
+        prediction: prediction for untraced samples.
         is_queued: the light was traced here. is_doubtful: the next level traces it.
         queue, samples: lights in the order of tracing, and masks of the samples to trace.
     """
@@ -93,12 +93,12 @@ def _new_level(num_lights):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def]
+def _flush(packet, block, num_waiting):  # type: ignore[no-untyped-def]
     """Trace the rays in the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
     if num_waiting == 0:
         return
     enable_first_lanes(packet, num_waiting)
-    trace_shadows(occluded, packet)
+    trace_shadows(packet)
     for lane in range(num_waiting):
         if is_unoccluded(packet, lane):
             owner = packet.owner[lane]
@@ -106,7 +106,7 @@ def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
+def _trace(packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against masks of samples, only those above the horizon and not yet traced; counts the rays."""
     facing, traced = block.facing_bits, block.traced_bits
     num_rays, lane = 0, _ZERO
@@ -125,12 +125,12 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
             num_rays += 1
             lane += 1
             if lane == LANES:
-                _flush(occluded, packet, block, lane)
+                _flush(packet, block, lane)
                 lane = _ZERO
         if lane >= _MIN_FULL_LANES:
-            _flush(occluded, packet, block, lane)
+            _flush(packet, block, lane)
             lane = _ZERO
-    _flush(occluded, packet, block, lane)
+    _flush(packet, block, lane)
     return num_rays
 
 
@@ -255,7 +255,7 @@ def _update_predictions(block, region, lights, previous_level, level, start, sto
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _flood(occluded, packet, block, positions, lights, region, samples, previous_level, level):  # type: ignore[no-untyped-def]
+def _flood(packet, block, positions, lights, region, samples, previous_level, level):  # type: ignore[no-untyped-def]
     """Trace `samples` against lights that `previous_level` doubts, then against neighbors of wrong predictions.
 
     Returns the number of rays; `level.prediction` then holds the predictions for the region.
@@ -265,7 +265,7 @@ def _flood(occluded, packet, block, positions, lights, region, samples, previous
     start, stop, num_rays = _ZERO, _init_level(block, region, previous_level, level), 0
     while start < stop:
         queued_lights, masks = level.queue[start:stop], level.samples[start:stop]
-        num_rays += _trace(occluded, packet, block, origins, directions, queued_lights, masks)
+        num_rays += _trace(packet, block, origins, directions, queued_lights, masks)
         start, stop = stop, _update_predictions(block, region, (first, index), previous_level, level, start, stop)
     return num_rays
 
@@ -286,7 +286,7 @@ def _mark_doubtful(level, lights):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _check_predictions(occluded, packet, block, positions, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
+def _check_predictions(packet, block, positions, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
     """Trace a few predicted samples; lights with errors become doubtful. Returns the numbers of rays and errors."""
     origins, (directions, _, _, _) = positions, lights
     queue_length, num_wrong = 0, 0
@@ -303,9 +303,7 @@ def _check_predictions(occluded, packet, block, positions, lights, region, start
             if sample:
                 level.queue[queue_length], level.samples[queue_length] = light, sample
                 queue_length += 1
-    num_rays = _trace(
-        occluded, packet, block, origins, directions, level.queue[:queue_length], level.samples[:queue_length]
-    )
+    num_rays = _trace(packet, block, origins, directions, level.queue[:queue_length], level.samples[:queue_length])
     for entry in range(queue_length):
         light = level.queue[entry]
         level.is_doubtful[light] = _is_contradicted(
@@ -324,41 +322,32 @@ def _accept_predictions(block, region, level):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _trace_quarter(occluded, packets, block, positions, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
+def _trace_quarter(packets, block, positions, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
     """Trace samples `span` of a block: two of them, then all of them for doubtful lights; then check."""
     (packet, coherent_packet), (block_level, quarter_level, sample_level) = packets, levels
     start, stop = span
     region = _mask(start, stop)
     far_samples = _far_samples(positions, start, stop)
-    counts[0] += _flood(occluded, packet, block, positions, lights, region, far_samples, block_level, quarter_level)
+    counts[0] += _flood(packet, block, positions, lights, region, far_samples, block_level, quarter_level)
     _mark_doubtful(quarter_level, lights)
-    counts[0] += _flood(
-        occluded, coherent_packet, block, positions, lights, region, region, quarter_level, sample_level
-    )
-    num_checked, num_wrong = _check_predictions(
-        occluded, packet, block, positions, lights, region, start, salt, sample_level
-    )
+    counts[0] += _flood(coherent_packet, block, positions, lights, region, region, quarter_level, sample_level)
+    num_checked, num_wrong = _check_predictions(packet, block, positions, lights, region, start, salt, sample_level)
     counts[0] += num_checked
     counts[2] += num_checked
     counts[3] += num_wrong
     if num_wrong:
-        counts[0] += _flood(
-            occluded, coherent_packet, block, positions, lights, region, region, sample_level, quarter_level
-        )
+        counts[0] += _flood(coherent_packet, block, positions, lights, region, region, sample_level, quarter_level)
         _accept_predictions(block, region, quarter_level)
     else:
         _accept_predictions(block, region, sample_level)
 
 
 @nb.njit(nogil=True, cache=True)
-def trace_blocks(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, coherent_arguments, origins, normals, alpha_sample, lights, start, stop, bits, counts
-):
+def trace_blocks(tracers, origins, normals, alpha_sample, lights, start, stop, bits, counts):  # type: ignore[no-untyped-def]
     """Trace and predict samples [start, stop) block by block; `start` is a multiple of `BLOCK`.
 
     Args:
-        occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
-        coherent_arguments: address of those for rays from all samples of a quarter to one light.
+        tracers: `PacketTracer` for mixed rays, and for rays from all samples of a quarter to one light.
         origins: off the surface. normals: shading normals. (n, 3) float32
         alpha_sample: for the rays of each sample, or for all, at blended surfaces. (n,) or (1,) float32
         lights: directions, the two arrays of `relume.lights.neighbors`, and the strong lights, which are always traced.
@@ -367,7 +356,7 @@ def trace_blocks(  # type: ignore[no-untyped-def]
     """
     directions = lights[0]
     n = directions.shape[0]
-    packet, coherent_packet = new_packet(scene, arguments), new_packet(scene, coherent_arguments)
+    packet, coherent_packet = new_packet(tracers[0]), new_packet(tracers[1])
     facing_bits, traced_bits, visible_bits = np.zeros(n, np.uint64), np.zeros(n, np.uint64), np.zeros(n, np.uint64)
     block = _Block(facing_bits, traced_bits, visible_bits, np.full(BLOCK, alpha_sample[0]))
     initial_level, block_level = _new_level(n), _new_level(n)
@@ -380,9 +369,9 @@ def trace_blocks(  # type: ignore[no-untyped-def]
             block.alpha_sample[:width] = alpha_sample[block_start:block_stop]
         counts[1] += _find_facing(normals[block_start:block_stop], directions, block)
         region, far_samples = _mask(_ZERO, width), _far_samples(positions, _ZERO, width)
-        counts[0] += _flood(occluded, packet, block, positions, lights, region, far_samples, initial_level, block_level)
+        counts[0] += _flood(packet, block, positions, lights, region, far_samples, initial_level, block_level)
         _mark_doubtful(block_level, lights)
         for quarter_start in range(0, width, _QUARTER):
             span, salt = (quarter_start, min(quarter_start + _QUARTER, width)), block_start + quarter_start
-            _trace_quarter(occluded, (packet, coherent_packet), block, positions, lights, span, salt, levels, counts)
+            _trace_quarter((packet, coherent_packet), block, positions, lights, span, salt, levels, counts)
         words_to_rows(block.visibility_bits, bits[block_start:block_stop])

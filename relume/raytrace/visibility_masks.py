@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from relume.core.color import luminance
 from relume.core.thread_pools import for_ranges
 from relume.lights.neighbors import find_neighbors
-from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.raytrace.visibility_kernel import BLOCK, trace_blocks
 
@@ -35,8 +35,8 @@ class RayCounts:
 
     Attributes:
         num_traced: traced shadow rays. num_full: rays of a full trace, all pairs above the horizon.
-        num_checked: predicted bits that were traced as a check, uniformly distributed. num_wrong: wrong ones among
-            them.
+        num_checked: predicted bits that were also traced, uniformly distributed.
+        num_wrong: wrong predictions among the checked bits.
     """
 
     num_traced: int
@@ -83,7 +83,7 @@ def make_light_targets(directions: Shaped[F32, "m 3"], irradiance: Shaped[F32, "
     """Prepare lights for `trace_visibility_masks`.
 
     Args:
-        directions: unit, toward the lights. irradiance: of each light, per channel.
+        directions: unit, toward the lights. irradiance: irradiance of each light, per channel.
     """
     luminous = luminance(irradiance)
     return LightTargets(directions, *find_neighbors(directions), luminous > _STRONG_LIGHT_FRACTION * luminous.sum())
@@ -100,32 +100,19 @@ def trace_visibility_masks(
 
     Args:
         scene: the occluding triangles.
-        origins: off the surface, mostly ordered by neighborhood in the image.
+        origins: positions, offset from the surface, mostly ordered by neighborhood in the image.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         targets: the lights, from `make_light_targets`.
-        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+        alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.
     Cost: O(n · m) time, plus O(m · log triangles) for each sample on a shadow edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
-    mixed_arguments, single_light_arguments = (packet_arguments(coherent=is_coherent) for is_coherent in (False, True))
+    tracers = scene.shadow_tracer(coherent=False), scene.shadow_tracer(coherent=True)
     range_counts = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
-        trace_blocks(
-            occluded,
-            scene.handle,
-            mixed_arguments.ctypes.data,
-            single_light_arguments.ctypes.data,
-            origins,
-            normals,
-            alpha_sample,
-            targets,
-            start,
-            stop,
-            bits,
-            counts,
-        )
+        trace_blocks(tracers, origins, normals, alpha_sample, targets, start, stop, bits, counts)
         range_counts.append(counts)
 
     start_time = time.perf_counter()

@@ -27,9 +27,10 @@ class BtfSurface:
     """Reflection of BTF-textured points.
 
     Attributes:
-        texels: the BTF. samples: of each point, from `relume.assets.btf.outgoing_radiance.sample_btf`; zero below
-            the horizon.
-        axes: of the texture, in the points' frames.
+        texels: the BTF.
+        samples: reflection of each point, from `relume.assets.btf.outgoing_radiance.sample_btf`; zero below the
+            horizon.
+        axes: axes of the texture, in the points' frames.
     """
 
     texels: BtfRef
@@ -51,7 +52,7 @@ def sample_btf_surface(
     """Look up the BTF at points.
 
     Args:
-        texels: mapping of the BTF. wo: in the points' frames, unit.
+        texels: mapping of the BTF. wo: wo in the points' frames, unit.
         uv: see `relume.raytrace.surface_interaction.SurfaceInteraction.uv`. rng: chooses positions in footprints.
     """
     axes = _texture_axes(texels, uv)
@@ -80,7 +81,7 @@ def _footprint_offsets(side: F64, wo: F64, rng: np.random.Generator) -> F64:
     """Random offsets in the pixel footprint: a rectangle, longer in the plane of the view direction and the normal.
 
     Args:
-        side: of a square with the footprint's area, in repeats. (n,). wo: in the texture's frame. (n, 3)
+        side: side length of a square with the footprint's area, in repeats. (n,). wo: wo in the texture's frame. (n, 3)
     Returns:
         One per stratum. (n, `_NUM_STRATA`², 2)
     """

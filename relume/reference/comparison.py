@@ -1,11 +1,11 @@
 """Error of a frame relative to the reference, separated from the noise of the reference.
 
 Passes of the reference are independent, but their noise has heavy tails: a highlight rarely samples a small light, and
-is then bright. So Student's t distribution does not apply. Passes are summed in batches, and the batches themselves
-show how far noise moves their mean: with the signs of half of the batches flipped, the signal cancels and noise of the
-same spread remains. The frame's difference in units of its noise is compared with that of sign-flipped batches, over
-pixels and over blocks of pixels. The largest set of which at most `FALSE_DISCOVERY_RATE` is expected by chance is
-called different (false discovery rate of Benjamini and Hochberg 1995, counted with decoys, Elias and Gygi 2007).
+is then bright. So Student's t distribution does not apply. Passes are summed in batches, whose variation shows
+the noise of the mean: if the signs of half of the batches are flipped, the signal cancels and noise of equal variance
+remains. The frame's difference in units of its noise is compared with that of sign-flipped batches, over pixels
+and over blocks of pixels. The largest set of which at most `FALSE_DISCOVERY_RATE` is expected by chance is called
+different (false discovery rate of Benjamini and Hochberg 1995, counted with decoys, Elias and Gygi 2007).
 
 All results follow from that set: if it is empty, no error was found, however large the differences.
 """
@@ -41,7 +41,7 @@ class Estimate:
     """Sums of reference passes in batches: pass k is in batch k modulo their number.
 
     Attributes:
-        sums: per batch.
+        sums: sums per batch.
         passes: number of passes.
     """
 
@@ -78,9 +78,9 @@ class Comparison:
     """Errors of a frame, relative to the root mean square of the reference over pixels and channels.
 
     Attributes:
-        rmse: of the difference, noise included. noise: of the estimate.
-        error: of the frame, without noise; None if it cannot be separated from the noise.
-        standard_error: of `error`, one standard deviation over other passes; None if `error` is.
+        rmse: RMS error of the difference, noise included. noise: noise of the estimate.
+        error: error of the frame, without noise; None if it cannot be separated from the noise.
+        standard_error: standard deviation of `error` between sets of passes; None if `error` is.
         error_upper_bound: two standard deviations above the error.
         significant_pixel_fraction: fraction of pixels that differ by more than noise explains; at most
             `FALSE_DISCOVERY_RATE` of these by chance.
@@ -142,7 +142,7 @@ def error_map(
     """Map of too bright (orange) and too dark (blue) pixels, in full color from a quarter of a stop, in sRGB.
 
     Args:
-        frame: linear radiance. estimate: of the reference.
+        frame: linear radiance. estimate: estimate of the reference.
         differs: pixels from `compare`; all others are gray.
     """
     mean = luminance(estimate.mean).astype(np.float64)
@@ -245,7 +245,7 @@ def _threshold(noise_ratios: F64, null_ratios: F64) -> float:
     """Least value above which at most `FALSE_DISCOVERY_RATE` are expected by chance; infinite if there is none.
 
     Args:
-        null_ratios: of all `_NUM_SIGN_FLIPS` trials.
+        null_ratios: noise ratios of all `_NUM_SIGN_FLIPS` trials.
     """
     values = np.sort(noise_ratios[noise_ratios > 0])
     num_discoveries = len(values) - np.arange(len(values))

@@ -41,7 +41,7 @@ class ReferenceEmitter:
     """A light of a look in a scene.
 
     Attributes:
-        triangles: of a mesh light. is_two_sided: emits to both sides.
+        triangles: triangles of a mesh light. is_two_sided: emits to both sides.
         uvs: texture coordinates of their corners. image: emission relative to its mean; None if uniform.
     """
 
@@ -63,10 +63,11 @@ class ReferenceEmitter:
 
         Args:
             geometry: the occluding triangles.
-            position: of the points, meters.
+            position: positions of the points, meters.
             num: number of samples per point.
             rng: random number generator.
-            alpha_sample: for the rays of each point, or for all; see `relume.raytrace.surface_points.SurfacePoints`.
+            alpha_sample: alpha samples for the rays of each point, or for all; see
+                `relume.raytrace.surface_points.SurfacePoints`.
         """
         to_light, factor = self._sample_vectors(position, num, rng)
         distance = np.linalg.norm(to_light, axis=2)
@@ -135,7 +136,7 @@ def hit_distance(
 
     Args:
         geometry: the triangles. start: origins, meters. direction: unit vectors.
-        alpha_sample: for blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
+        alpha_sample: alpha sample for blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
     """
     batches = (slice(k, k + _RAYS_PER_BATCH) for k in range(0, len(direction), _RAYS_PER_BATCH))
     return np.concatenate([

@@ -24,9 +24,9 @@ class EnvironmentSamples:
         direction: unit, world space.
         power: radiance times solid angle.
         cdf: cumulative distribution of luminance, ending in 1.
-        index: of each texel in the map, row-major.
+        index: index of each texel in the map, row-major.
         map: the environment's radiance.
-        rotation: of the map about +Y, degrees. gain: factor of each channel.
+        rotation: rotation of the map about +Y, degrees. gain: factor of each channel.
         luminance: total luminance times solid angle, before the gain.
     """
 
@@ -78,7 +78,7 @@ def environment_texels(environment: Environment, rotation: float = 0.0) -> Envir
     """All texels that are not black.
 
     Args:
-        rotation: of the map about +Y, degrees.
+        rotation: rotation of the map about +Y, degrees.
     """
     height, width, _ = environment.radiance.shape
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets import environments
 from relume.assets.environments.environment import Environment
+from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import lookup, rotate_about_y
 from relume.camera.specular_hits import is_mirror_material
 from relume.camera.view_samples import BACKGROUND, ViewSamples, sample_view
@@ -71,8 +71,8 @@ class ReferenceImage:
     """Images of one reference pass.
 
     Attributes:
-        all_paths_image: with all light paths; None if not requested.
-        method_image: with the light paths of the method.
+        all_paths_image: image with all light paths; None if not requested.
+        method_image: image with the light paths of the method.
         omitted_paths: paths that the method omits; unsupported_paths: paths that the reference omits too. In sentences.
     """
 
@@ -153,7 +153,7 @@ class _ViewSetup:
     """Samples of a view, and the lights of its look.
 
     Attributes:
-        points: of `samples`, which are sorted by material.
+        points: points of `samples`, which are sorted by material.
         light: the environment of the look; texels: rotated and scaled by the look.
     """
 
@@ -191,7 +191,7 @@ def _prepare_view(scene: Scene, view: str, look: Look, size: tuple[int, int]) ->
     geometry = build_scene_buffers(scene)
     # here mirrors are lobes like others, and light through tinted glass is traced per channel, not by mean tints
     samples = sample_view(scene, geometry, view, size, traces_mirrors=False, by_channel=True)
-    light = scene.environment if look.environment.map is None else environments.load_environment(look.environment.map)
+    light = scene.environment if look.environment.map is None else load_environment(look.environment.map)
     texels = environment_texels(light, look.environment.rotation).scaled(look.environment.gain)
     look_args = scene, look, samples.surface, samples.material
     points = points_of_samples(samples, surface_textures(*look_args), surface_roughness(*look_args))
@@ -259,7 +259,7 @@ def points_of_samples(
 ) -> ReferencePoints:
     """Convert view samples to points; points of background samples are meaningless.
 
-    samples: of a view. textures, roughness: at the samples, see `ReferencePoints`.
+    samples: samples of a view. textures, roughness: textures and roughness at the samples, see `ReferencePoints`.
     """
     points = samples.surface.points
     to_camera = samples.camera.astype(np.float64) - points.position

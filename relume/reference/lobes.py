@@ -89,7 +89,7 @@ def curve_lobe(angle: Angle, axes: tuple[float, float, float], values: Shaped[F6
 
     Args:
         angle: argument of the curve.
-        axes: of the curve. values: at equal steps over [0, π/2], mean of the channels.
+        axes: axes of the curve. values: values at equal steps over [0, π/2], mean of the channels.
     """
     midpoints = 0.5 * (values[1:] + values[:-1])
     if angle in _HALF_ANGLES:

@@ -50,7 +50,7 @@ class IndirectReference(NamedTuple):
     """Radiance of points by indirect light.
 
     Attributes:
-        mean, variance: over paths; the variance of the mean.
+        mean: mean over paths. variance: variance of this mean.
     """
 
     mean: Shaped[F64, "light_paths n 3"]
@@ -72,14 +72,14 @@ def reference_indirect(
     """Radiance of points by indirect light, for several selections of light paths at once.
 
     Args:
-        scene: its materials and lights.
-        geometry: of the scene.
-        texels: of the environment, with its gain in the look.
+        scene: the scene, with its materials and lights.
+        geometry: triangles of the scene.
+        texels: texels of the environment, with its gain in the look.
         look: terms and lights.
-        points: n of them. material: index into the scene's materials.
+        points: n points. material: index into the scene's materials.
         light_paths: selections; `direct` selects direct light in mirrors.
-        num_paths: per point. spp: environment texels per path vertex.
-        seed: of the paths; other seeds are independent.
+        num_paths: number of paths per point. spp: environment texels per path vertex.
+        seed: seed of the paths; other seeds are independent.
     Cost: O(n · num_paths · bounces · spp) shadow rays, with the maximum number of bounces of all selections.
     """
     classes, local_lights = roughness_classes(scene, look), emitters(scene, look)
@@ -212,8 +212,9 @@ def _sample_directions(
     """Sample a direction for each point from one of its material's lobes.
 
     Args:
-        classes: of the scene. lobes: of each class. points: n of them. class_index: of each. (n,)
-        btf_surfaces: by class and term, for all points of a class.
+        classes: classes of the scene. lobes: lobes of each class. points: n points.
+        class_index: class of each point. (n,)
+        btf_surfaces: BTF surfaces by class and term, for all points of a class.
         rng: random number generator.
     Returns:
         World space, unit (n, 3); f cos θi over the density of all lobes together (n, 3), zero below the horizon; and

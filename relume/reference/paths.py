@@ -1,4 +1,4 @@
-"""Light paths of a look, the paths of them that a method supports, and sentences about omitted paths."""
+"""Light paths of a look, those that a method supports, and sentences about omitted paths."""
 
 from __future__ import annotations
 

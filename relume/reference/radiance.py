@@ -3,7 +3,6 @@ lights, with f the sum of a look's terms."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -12,7 +11,9 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
+from relume.brdf.curve_edits import drawn_curves
+from relume.brdf.curves import CHANNELS, curve_values
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.brdf.texture_slots import texture_channel
@@ -46,11 +47,12 @@ class ReferencePoints:
     """Points on surfaces with one view direction each; successive points should be neighbors.
 
     Attributes:
-        position: off the surface. normal, tangent: shading frame. wo: toward the viewer.
+        position: positions, offset from the surface. normal, tangent: shading frame. wo: toward the viewer.
         textures: factors of terms by channel, "diffuse" and "specular". (n, 3) float32 each
         roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`.
-        uv: see there; None to use the mean of BTFs.
-        alpha_sample: for shadow rays at blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
+        uv: see `SurfaceInteraction`; None to use the mean of BTFs.
+        alpha_sample: alpha sample for shadow rays at blended surfaces; see
+            `relume.raytrace.surface_points.SurfacePoints`.
     """
 
     position: Shaped[F32, "n 3"]
@@ -111,13 +113,13 @@ class _Tables:
 
 
 def _tabulate(document: Document) -> _Tables:
-    return _build_tables(json.dumps(document, sort_keys=True))
+    return _build_tables(FrozenTerm.from_document(document))
 
 
 @asset_cached("tables of brute force")
-def _build_tables(term_text: str) -> _Tables:
+def _build_tables(frozen_term: FrozenTerm) -> _Tables:
     """Tabulate a term; cached, because paths need all terms of all roughness classes at every bounce; some MB."""
-    document = json.loads(term_text)
+    document = frozen_term.document
     term = TERMS[document["model"]].normalized(document)
     curves = [curve for curve in term.curves if not curve.depends_on_view]
     gamma = np.linspace(0.0, MAX_ANGLE, _STEPS + 1)
@@ -153,9 +155,9 @@ def reference_radiance(
 
     Args:
         geometry: the occluding triangles.
-        texels: of the environment, with their radiance and solid angles.
-        points: n of them.
-        materials: terms of each, from a complete look.
+        texels: texels of the environment, with their radiance and solid angles.
+        points: n points.
+        materials: terms of each material, from a complete look.
         spp: texels sampled by power per point, plus some directions sampled by the materials' lobes, and points per
             area light; 0, or as many as there are, for all texels at their centers.
         progress: called with the finished fraction of points, in [0, 1].
@@ -248,7 +250,7 @@ def material_lobes(terms: Sequence[Document]) -> list[Lobe]:
     """Lobes of a material: the cosine lobe, then each lobe of its terms.
 
     Args:
-        terms: from a complete look.
+        terms: terms of a complete look.
     """
     return [cosine_lobe(), *(lobe for document in terms for lobe in _curve_lobes(_tabulate(document)))]
 

@@ -31,7 +31,8 @@ class RoughnessClasses:
     """Roughness classes of a scene's surfaces.
 
     Attributes:
-        terms: of each class. mirrors: mirror fraction of each term of a class, per channel; zero unless the scene's own
+        terms: terms of each class.
+        mirrors: mirror fraction of each term of a class, per channel; zero unless the scene's own
             material is a mirror, because only those are traced in bakes.
         first: first class of each material. ratios: relative roughness of each material's classes, empty for one.
     """

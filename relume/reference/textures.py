@@ -83,8 +83,8 @@ def surface_textures(
     """Factors of terms by texture channel, at surface points.
 
     Args:
-        scene: with its materials. look: the look. surface: the points.
-        material: index of each into the scene's materials; other values keep their textures.
+        scene: scene with its materials. look: the look. surface: the points.
+        material: index of each point's material in the scene; other values keep their textures.
     Returns:
         (n, 3) float32 each
     """

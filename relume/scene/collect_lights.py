@@ -61,7 +61,7 @@ class LightCollector:
 
         Args:
             materials: all materials of the scene.
-            emissions: of each material, multiplied by its image.
+            emissions: emitted radiance of each material, multiplied by its image.
             meshes: all meshes of the scene; a material without a mesh is no light.
         Returns:
             The materials, with emission images divided by their mean.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError, count_text
 from relume.scene.model import Camera, Scene
 
 MAX_NAME = 80
@@ -47,7 +47,7 @@ def make_custom_camera(name: str, to_world: Sequence[float], yfov: float) -> Cus
     """Validate a camera that a user placed.
 
     Args:
-        name: of its views.
+        name: name of its views.
         to_world: camera to world, 16 numbers by row; the camera looks along its -Z. Scale is removed.
         yfov: vertical field of view, degrees.
     Raises:
@@ -90,7 +90,8 @@ def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
     """Remove the scale of a frame. Raises ParameterError if its axes are not those of a camera."""
     allowed = "16 finite numbers by row, the last four 0, 0, 0, 1"
     if len(to_world) != 16:
-        raise ParameterError("to_world", f"{len(to_world)} numbers", allowed)
+        value = Description(f"a list of {count_text(len(to_world), 'number', 'numbers')}")
+        raise ParameterError("to_world", value, allowed)
     frame = np.array(to_world, np.float64).reshape(4, 4)
     if not np.isfinite(frame).all() or not np.array_equal(frame[3], (0, 0, 0, 1)):
         raise ParameterError("to_world", list(to_world), allowed)

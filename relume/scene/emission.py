@@ -30,8 +30,8 @@ def normalize_emission(
     """Divide a material's emission texture by its mean over the surfaces.
 
     Args:
-        material: its texture "emission" has sRGB bytes. emission: factor of the texture.
-        meshes: that use the material.
+        material: material whose texture "emission" has sRGB bytes. emission: factor of the texture.
+        meshes: meshes that use the material.
     Returns:
         The material, without the texture if it is uniform; and the mean radiance of its surfaces.
     """

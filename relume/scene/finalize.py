@@ -29,7 +29,7 @@ def finalize(
         name: shown to users.
         meshes, materials, cameras: at least one of each; a mesh's `material` is an index into `materials`.
         environment: the distant light.
-        warnings: of the importer, one sentence each.
+        warnings: warnings of the importer, one sentence each.
         variants: partial looks by name.
         lights: local lights with unique names.
     Raises:

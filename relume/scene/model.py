@@ -45,7 +45,7 @@ class Texture:
         pixels: top row first. uint8 with three channels, or one for kind "share", if there is an encoding; otherwise
             float32 with three.
         wrap: wrap modes of u and v outside [0, 1): "repeat", "mirror" or "clamp".
-        encoding: of bytes; None if pixels are linear RGB or normals.
+        encoding: encoding of bytes; None if pixels are linear RGB or normals.
     """
 
     pixels: Shaped[NDArray[Any], "height width channels"]
@@ -94,7 +94,7 @@ class Mesh:
         normals: unit, world space.
         tangents: unit, world space, with handedness in w; zero if the file has none.
         uvs: UV coordinates, v from the top as in glTF; zero if the file has none.
-        faces: counter-clockwise from outside.
+        faces: counterclockwise from outside.
         material: index into `Scene.materials`.
     """
 
@@ -113,7 +113,7 @@ class Material:
 
     Attributes:
         terms: default terms, as in a look document.
-        textures: by channel. "diffuse" and "specular" multiply the terms that name them, such as
+        textures: textures by channel. "diffuse" and "specular" multiply the terms that name them, such as
             `"texture": "diffuse"`. "roughness" is relative to the roughness of the terms and scales the width of those
             with `"roughness_map": "roughness"`. "emission" is relative to the mean emission of the surfaces.
         normal_map: tangent-space normals in [-1, 1]; None without normal mapping.
@@ -171,7 +171,7 @@ class Scene:
 
     Attributes:
         id: hash of the content, hexadecimal.
-        warnings: of the importer, one sentence each.
+        warnings: warnings of the importer, one sentence each.
         variants: partial looks by name, from the file.
     """
 

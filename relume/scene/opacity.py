@@ -23,8 +23,8 @@ def make_opacity(
     """Make a material's opacity; None if it is opaque.
 
     Args:
-        alpha: of its texture, 255 is opaque; None without a texture.
-        wrap: of the texture. factor: multiplies alpha, in [0, 1].
+        alpha: alpha values of its texture, 255 is opaque; None without a texture.
+        wrap: wrap mode of the texture. factor: multiplies alpha, in [0, 1].
         cutoff: alpha-test threshold in [0, 1]; None for stochastic transparency.
         label: names the material in warnings. warnings: gets a sentence if the material is invisible.
     """

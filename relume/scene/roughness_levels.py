@@ -1,8 +1,8 @@
 """Quantization of roughness maps into levels.
 
 A minified normal map makes a material rougher: normals vary within the footprint of a pixel. With their mean n̄, slopes
-have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a microfacet lobe with slope variance α² / 2
-widens to α² + 2 σ² (Olano and Baker 2010). With α = r²,
+have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a microfacet lobe with slope variance α² /
+2 widens to α² + 2 σ² (Olano and Baker 2010). With α = r²,
 
     r'(x) = (r(x)⁴ + 2 σ²(x))^¼,   stored relative to the material's own roughness r.
 
@@ -40,8 +40,9 @@ def levels_of_texture(texture: Texture | None, base: float | None, min_length: f
     """Roughness levels over the range of a map, as `levels_of_material` returns them.
 
     Args:
-        texture: roughness over its mean, as bytes; None for a constant 1. base: that mean, see `rougher`; None without
-            widening by normals. min_length: from `min_mean_normal_length`.
+        texture: roughness over its mean, as bytes; None for a constant 1.
+        base: mean roughness, see `rougher`; None without widening by normals.
+        min_length: from `min_mean_normal_length`.
     """
     return levels_in_range(*ratio_range(texture), base, min_length)
 
@@ -86,7 +87,7 @@ def rougher(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) ->
     """Roughness relative to `base`, widened by the variation of normals.
 
     Args:
-        ratio: of a roughness map. length: of the mean normal, at most 1.
+        ratio: ratio of a roughness map. length: length of the mean normal, at most 1.
         base: the roughness of the material's terms.
     """
     return np.asarray(((base * ratio) ** 4 + 2 * _variance(length)) ** 0.25 / base, np.float32)
@@ -109,7 +110,7 @@ def select_level(
     """Choose one of the two levels that enclose each ratio.
 
     Args:
-        ratios: of the levels, ascending. ratio: to quantize.
+        ratios: ratios of the levels, ascending. ratio: ratio to quantize.
         threshold: smallest fractional position for the higher level, in (0, 1). Thresholds that vary between neighbors
             dither the levels, so that no contours are visible.
     """

@@ -22,7 +22,7 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
     """Add a large disc below the lowest point of a scene, with a material of its own that can be a shadow catcher.
 
     Args:
-        name: of the new scene; None for the old name.
+        name: name of the new scene; None for the old name.
     Raises:
         SceneError: the scene has a ground already, or too many materials.
     """

@@ -66,7 +66,7 @@ def encode_rows(
 
     Args:
         values: returns (rows, width, 3), or (1, 1, 3) for a uniform texture. size: height and width.
-        max_value: upper bound of the values. wrap: of the texture.
+        max_value: upper bound of the values. wrap: wrap mode of the texture.
     """
     pixels = np.empty((*size, 3), np.uint8)
     scale = np.maximum(max_value, 1e-6)

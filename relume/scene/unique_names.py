@@ -16,7 +16,7 @@ def append_number(plain: str, separator: str, used_names: dict[str, int]) -> str
 
     Args:
         plain: the preferred name.
-        separator: between the name and the number.
+        separator: text between the name and the number.
         used_names: the last number tried for each name; the new name is added.
     """
     name = plain

@@ -27,7 +27,7 @@ def import_scene(
 
     Args:
         source: a path, whose folder may have further files; or the bytes of a file.
-        name: of the scene, shown to users.
+        name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: further files, if they are not in the folder or in the same archive.
 
@@ -62,5 +62,5 @@ def read_file(source: str | Path | bytes) -> bytes:
         except OSError as problem:
             raise SceneError(f"{str(source)!r} cannot be read ({problem.strerror}); check the path") from None
     if len(data) > MAX_FILE_BYTES:
-        raise SceneError(f"the scene file is {len(data) >> 20} MB, the limit {MAX_FILE_BYTES >> 20} MB; simplify it")
+        raise SceneError(f"the scene file has {len(data) >> 20} of at most {MAX_FILE_BYTES >> 20} MB; simplify it")
     return data

@@ -82,7 +82,7 @@ class NamedFiles(Generic[Entry]):
     def __init__(self, entries: Mapping[str, Entry], folder: str, read: Callable[[Entry], bytes]) -> None:
         """
         Args:
-            entries: by name, passed to `read`. folder: of the scene file, within those names.
+            entries: entries by name, passed to `read`. folder: folder of the scene file, within those names.
         """
         self._entries = {posixpath.normpath(name.replace("\\", "/")).lower(): entry for name, entry in entries.items()}
         self._folder, self._read = folder, read
@@ -114,7 +114,7 @@ class UploadedFiles(NamedFiles[Path]):
             files: current paths by original name. scene: original name of the scene file.
 
         Raises:
-            SceneError: they are too large in total.
+            SceneError: the files are too large in total.
         """
         if sum(path.stat().st_size for path in files.values()) > MAX_BYTES:
             raise SceneError(f"the files next to the scene have over {MAX_BYTES >> 20} MB; scale them down")

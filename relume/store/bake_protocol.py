@@ -1,7 +1,7 @@
 """The bake protocol: plan (pure), tasks, compute (pure), and the interfaces for workers.
 
-bake (worker, once) → freeze (server, on prepare) → frame (server, per edit). To add a method, write one module and add
-one line to `relume.methods.registry`; the contract suite in tests/contract then tests it.
+bake (worker, once) → freeze (server, on prepare) → frame (server, per edit). `relume.methods.registry` lists how
+methods bake, `relume.live.opened.openers` how their bakes open; the contract suite in tests/contract tests both.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Recipe:
         views: camera names, in order.
         size: width and height in pixels.
         num_lights: number of environment triangles.
-        relightable: choose them for any environment, not for the scene's own.
-        cameras: those of `views` that users placed; the others belong to the scene.
+        relightable: choose the triangles for any environment, not for the scene's own.
+        cameras: the cameras of `views` that users placed; the others belong to the scene.
         num_probes: surface probes for a free camera; methods with fixed cameras have none.
-        num_patches: surface patches for indirect light. gather_rays: per view sample or probe. None: the method
-            chooses; `direct` has none.
+        num_patches: surface patches for indirect light.
+        gather_rays: gather rays per view sample or probe. None: the method chooses; `direct` has none.
     """
 
     method: str
@@ -74,7 +74,7 @@ class ArraySpec:
     """One Zarr array of a store.
 
     Attributes:
-        path: inside the store, e.g. "views/front/visibility".
+        path: path inside the store, e.g. "views/front/visibility".
         chunks: unit of reading. shards: unit of writing; a task owns whole shards.
     """
 
@@ -92,8 +92,8 @@ class Task:
     Attributes:
         stage: index into `BakeMethod.stages`; a stage starts when the previous one is complete.
         index: position within the stage; (stage, index) identifies the task.
-        group: the view it belongs to, "" for none.
-        start, stop: the rows of the stage's arrays that it owns, shard-aligned.
+        group: view of the task, "" for none.
+        start, stop: rows of the stage's arrays that the task owns, shard-aligned.
     """
 
     stage: int
@@ -109,11 +109,12 @@ class Plan:
 
     Attributes:
         num_rays: shadow and camera rays.
-        store_bytes: on disk, uncompressed.
-        disk_bytes: on disk, extrapolated from a compressed sample; no bound. 0 without a sample: use `store_bytes`.
+        store_bytes: bytes on disk, uncompressed.
+        disk_bytes: bytes on disk, extrapolated from a compressed sample; no bound. 0 without a sample: use
+            `store_bytes`.
         scratch_bytes: temporary files during the bake.
         peak_bytes: memory of one worker process.
-        lone_bytes: part of it that only one process needs at a time: for a step with a single task.
+        lone_bytes: part of `peak_bytes` that only one process needs at a time, for a step with a single task.
         work_s: approximate time on one core, for comparing plans. 0 in older plans.
     """
 
@@ -172,7 +173,7 @@ class TaskStore(StoreReader, Protocol):
 
 
 class BakeMethod(Protocol):
-    """Baking of a light transport method; `relume.methods.base.TransferMethod` adds opening."""
+    """Baking of a light transport method; nothing of pictures."""
 
     @property
     def name(self) -> str:
@@ -193,7 +194,7 @@ class BakeMethod(Protocol):
         ...
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """Root attributes of the store: JSON, enough to open it without the scene."""
+        """Root attributes of the store: JSON; with the scene's look, enough to open it without the scene."""
         ...
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:

@@ -19,7 +19,7 @@ from zarr.storage import LocalStore
 
 from relume.core.errors import ChunkDamagedError, StoreDeletedError, StoreError, StoreNotFoundError
 from relume.store.bake_protocol import ArraySpec
-from relume.store.room import scratch_file
+from relume.store.disk_space import scratch_file
 from relume.store.schema import (
     MANIFEST_NAME,
     check_path,
@@ -60,7 +60,7 @@ class Reader:
         """Read rows [start, stop) of an array.
 
         Args:
-            path: of the array inside the store. start, stop: rows; by default all.
+            path: path of the array inside the store. start, stop: rows; by default all.
         Raises:
             StoreDeletedError: the whole store was deleted.
             ChunkDamagedError: a shard is missing or truncated, or a checksum fails.

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from relume.core.errors import StoreError
 from relume.core.source_hash import bake_code
+from relume.look.document import default_look
 from relume.scene.model import Scene
 from relume.store.bake_protocol import BakeMethod, Recipe, Task, TaskOutput
 from relume.store.publish import publish
@@ -25,7 +26,8 @@ def create_staging_store(method: BakeMethod, scene: Scene, recipe: Recipe, stagi
         scene: the scene. recipe: its recipe.
         staging: folder of the unfinished store; made if missing.
     """
-    create_store(staging, {**method.attributes(scene, recipe), "code": bake_code()})
+    look = default_look(scene.materials, scene.lights)
+    create_store(staging, {**method.attributes(scene, recipe), "look": look, "code": bake_code()})
 
 
 def create_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:

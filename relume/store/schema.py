@@ -118,7 +118,7 @@ def default_layout(path: str, shape: tuple[int, ...], dtype: str, item_bytes: in
     """Layout of an array that its task writes as a whole: chunks of about half a megabyte, shards of some chunks.
 
     Args:
-        path: of the array inside the store. shape: with at least one dimension.
+        path: path of the array inside the store. shape: shape with at least one dimension.
         dtype: NumPy name of its type. item_bytes: size of one element.
     Raises:
         StoreError: the array has no dimensions.

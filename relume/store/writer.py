@@ -20,7 +20,7 @@ from zarr.storage import LocalStore
 
 from relume.core.errors import StoreError
 from relume.store.bake_protocol import ArraySpec, RowSource
-from relume.store.room import check_disk_space
+from relume.store.disk_space import check_disk_space
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
 from relume.store.small_files import read_json
 
@@ -81,8 +81,8 @@ class StoreWriter:
         """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.
 
         Args:
-            path: of the array, which must exist.
-            rows: with the array's type and shape except for their number.
+            path: path of the array, which must exist.
+            rows: rows with the array's type and shape except for their number.
             start: index of the first row.
         Raises:
             StoreError: there is no such array, or the rows do not fit it or split a shard.

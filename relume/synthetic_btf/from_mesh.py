@@ -60,7 +60,7 @@ def _to_unit_square(positions: F64, period: float | None) -> F64:
     if period is None:
         if abs(width - depth) > _SQUARE_TOLERANCE * max(width, depth):
             raise ParameterError(
-                "period", "not given", f"the side of the repeated square: the mesh is {width:g} × {depth:g} meters"
+                "period", None, f"the side of the repeated square; the mesh is {width:g} × {depth:g} meters"
             )
         period = float(max(width, depth))
     if not (period > 0 and max(width, depth) <= _MAX_EXTENT * period and height <= _MAX_HEIGHT * period):

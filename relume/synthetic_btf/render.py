@@ -46,7 +46,7 @@ _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class _SurfaceSamples(NamedTuple):
-    """Points on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32. material: (n,)"""
+    """Points offset from the geometry, with shading normals. position, normal: (n, 3) float32. material: (n,)"""
 
     position: F32
     normal: F32
@@ -60,7 +60,7 @@ class _LightSamples(NamedTuple):
     """Light directions for one sample of each texel, and their contributions to the values of all l.
 
     Attributes:
-        directions: ω. (L, 3). weights: in the texel's values. (L of values, L of ω)
+        directions: ω. (L, 3). weights: weights in the texel's values. (L of values, L of ω)
     """
 
     directions: F64
@@ -71,9 +71,9 @@ class TileGeometry:
     """A tile with its repetitions, as a ray-tracing scene.
 
     Args:
-        tile: one period. grid: of light and view directions. size: height and width of the texture, texels.
+        tile: one period. grid: grid of light and view directions. size: height and width of the texture, texels.
         samples_per_side: samples along each side of a texel, each with different light directions.
-        seed: of the rays for form factors.
+        seed: seed of the rays for form factors.
     """
 
     def __init__(

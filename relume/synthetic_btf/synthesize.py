@@ -44,7 +44,7 @@ class SyntheticBtf(NamedTuple):
         geometry: one of `GEOMETRIES`, or `MESH`. size: texels per side.
         grid: samples along each side of a texel, each with different light directions.
         bound: allowed relative RMS error of the compression.
-        file: of a mesh. period: of it, see `read_tile`.
+        file: file of a mesh. period: period of the mesh, see `read_tile`.
     """
 
     geometry: str
@@ -61,9 +61,9 @@ class SyntheticBtf(NamedTuple):
         if not (self.size >= MIN_SIZE and self.size**2 <= MAX_TEXELS):
             raise ParameterError("--size", self.size, f"{MIN_SIZE} to {int(MAX_TEXELS**0.5)} texels")
         if not 1 <= self.grid <= MAX_GRID:
-            raise ParameterError("--grid", self.grid, f"1 to {MAX_GRID}")
+            raise ParameterError("--grid", self.grid, f"a number from 1 to {MAX_GRID}")
         if not 1e-4 <= self.bound <= 0.5:
-            raise ParameterError("--error", self.bound, "0.0001 to 0.5")
+            raise ParameterError("--error", self.bound, "a number from 0.0001 to 0.5")
 
     def tile(self) -> Tile:
         """Return the geometry. Raises SceneError, ParameterError if the file is unusable."""
@@ -91,7 +91,7 @@ def synthesize_btf(
     """Render and compress a BTF; an equal request is the same BTF, and an interrupted one resumes.
 
     Args:
-        folder: of the asset store. request: what to render. name: shown to users.
+        folder: folder of the asset store. request: what to render. name: shown to users.
         progress: called with the completed fraction. is_canceled: checked regularly.
         partial_folder: folder of rendered values; by default in `folder`, named by the request.
     Raises:

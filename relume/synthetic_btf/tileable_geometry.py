@@ -20,8 +20,8 @@ class Tile(NamedTuple):
     Triangles may extend over the square's sides, as do those of the neighboring periods.
 
     Attributes:
-        normals: unit. faces: counter-clockwise from outside.
-        material: of each face.
+        normals: unit. faces: counterclockwise from outside.
+        material: material index of each face.
         materials: terms of each, as in look documents; isotropic.
     """
 
@@ -68,9 +68,9 @@ def extruded(
     """Extrude a yarn along a path: positions, normals and faces.
 
     Args:
-        path: center line, in a plane that contains z; its first and last points only give the direction. radius: of the
-            yarn, across z.
-        num_corners: of its cross-section. flat: its height over its width.
+        path: center line, in a plane that contains z; its first and last points only give the direction.
+        radius: radius of the yarn across z. num_corners: number of corners of the yarn's cross-section.
+        flat: height over width of the cross-section.
     """
     along, path = path[2:] - path[:-2], path[1:-1]
     along /= np.linalg.norm(along, axis=1, keepdims=True)

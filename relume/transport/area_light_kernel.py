@@ -7,17 +7,21 @@ halves (`relume.lights.light_sampling`), down to single samples.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
-from relume.lights.light_sampling import NOT_FLAT_RADIUS
-from relume.lights.local_lights import light_sample
+from relume.lights.light_sampling import NOT_FLAT_RADIUS, EmitterParts, LightStrata
+from relume.lights.local_lights import LocalLight, light_sample
 from relume.raytrace.gather_rays import cranley_patterson_offset
 from relume.transport.gather_kernel import in_frame
 from relume.transport.light_culling import cull
+
+F32 = NDArray[np.float32]
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _THIRD, _TWO = np.float32(1 / 3), np.float32(2)
@@ -25,6 +29,49 @@ _PI = np.float32(math.pi)
 _NARROW = np.float32(0.12)  # radians, to the farthest corner: cosines vary over it by about 0.01
 _NOT_FLAT = np.float32(NOT_FLAT_RADIUS)
 _NOTHING = np.float32(1e-6)  # fraction of a part: a corner belongs to a triangle if it is two of its four
+
+
+class AreaLight(NamedTuple):
+    """A light with a surface: see `relume.transport.shading_points.LocalRays`. gain: on its unit emission."""
+
+    light: LocalLight
+    strata: LightStrata
+    parts: EmitterParts
+    gain: Shaped[F32, " 3"]
+
+
+class AreaTriangles(NamedTuple):
+    """Memory for the visible triangles of area lights.
+
+    Attributes:
+        nodes: unit directions of corners and edge midpoints.
+        irradiance_radius: irradiance per channel and angular radius, radians.
+    """
+
+    nodes: Shaped[F32, "M 6 3"]
+    irradiance_radius: Shaped[F32, "M 4"]
+
+
+class _Scratch(NamedTuple):
+    """Scratch memory of a thread.
+
+    Attributes:
+        frame: tangent, n × t, normal of the shaded point. cull: for `cull`.
+        corner: of a quadrilateral, relative to the shaded point, meters. normal: of the light there.
+        stack: levels and indices of parts, three more at each level.
+    """
+
+    frame: Shaped[F32, "3 3"]
+    corner: Shaped[F32, "4 3"]
+    normal: Shaped[F32, " 3"]
+    stack: Shaped[NDArray[np.int64], "parts 2"]
+    cull: Shaped[F32, "2 triangles"]
+
+
+def allocate_scratch(max_triangles: int) -> _Scratch:
+    """Allocate scratch memory for `list_area_light`. max_triangles: of a point."""
+    frame, corner, normal = np.empty((3, 3), np.float32), np.empty((4, 3), np.float32), np.empty(3, np.float32)
+    return _Scratch(frame, corner, normal, np.empty((16, 2), np.int64), np.empty((2, max_triangles), np.float32))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -94,34 +141,17 @@ def _radius(x, y, z, node):  # type: ignore[no-untyped-def]
     return _TWO * math.asin(min(_HALF * math.sqrt(max_squared), _ONE))
 
 
-# Passing arrays of the light to a call would count references to them, and threads share these counters: listing parts
-# took twice as long. Hence the inlining.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _add_halves(  # type: ignore[no-untyped-def]
-    frame,
-    corner,
-    normal,
-    first_fraction,
-    area,
-    gain,
-    is_two_sided,
-    num_triangles,
-    end,
-    light,
-    wi,
-    nodes,
-    irradiance_radius,
-):
-    """Add the two triangles of a quadrilateral.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _add_halves(first_fraction, area, area_light, scratch, num_triangles, end, listed, triangles):  # type: ignore[no-untyped-def]
+    """Add the two triangles of the quadrilateral in `scratch`.
 
     Args:
-        frame: tangent, n × t, normal of the shaded point. (3, 3) corner: relative to this point, meters. (4, 3)
-        normal: of the light at this part. (3,) first_fraction: fraction of the light in the first triangle.
-        area: that the quadrilateral represents, m². gain: (3,). num_triangles, end: triangles and entries so far.
-        light, wi, nodes, irradiance_radius: written, see `list_area_light`.
+        first_fraction: fraction of the light in the first triangle. area: that the quadrilateral represents, m².
+        num_triangles, end: triangles and entries so far. listed, triangles: written.
     Returns:
         The new num_triangles and end.
     """
+    frame, corner, normal, wi = scratch.frame, scratch.corner, scratch.normal, listed.wi
     for half in range(2):
         triangle_area = area * (first_fraction if half == 0 else _ONE - first_fraction)
         if triangle_area <= _NOTHING * area:
@@ -132,16 +162,16 @@ def _add_halves(  # type: ignore[no-untyped-def]
         squared = x * x + y * y + z * z
         x, y, z = _unit(x, y, z)
         cosine = -(x * normal[0] + y * normal[1] + z * normal[2])
-        cosine = abs(cosine) if is_two_sided else cosine
+        cosine = abs(cosine) if area_light.light.is_two_sided else cosine
         up = frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z
         if cosine <= 0 or up <= 0:
             continue
-        _triangle_nodes(corner, 1 + half, nodes[num_triangles])
+        _triangle_nodes(corner, 1 + half, triangles.nodes[num_triangles])
         weight = triangle_area * cosine / max(squared, triangle_area / _PI)
         for channel in range(3):
-            irradiance_radius[num_triangles, channel] = weight * gain[channel]
-        irradiance_radius[num_triangles, 3] = _radius(x, y, z, nodes[num_triangles])
-        light[end] = num_triangles
+            triangles.irradiance_radius[num_triangles, channel] = weight * area_light.gain[channel]
+        triangles.irradiance_radius[num_triangles, 3] = _radius(x, y, z, triangles.nodes[num_triangles])
+        listed.light[end] = num_triangles
         wi[0, end] = frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z
         wi[1, end] = frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z
         wi[2, end] = up
@@ -149,51 +179,42 @@ def _add_halves(  # type: ignore[no-untyped-def]
     return num_triangles, end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _outline(light, strata, emitter_parts, part_index, sample, shift, x, y, z, area, corner, across):  # type: ignore[no-untyped-def]
-    """Compute the quadrilateral that represents a part.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _outline(area_light, part_index, sample, shift, position, area, scratch):  # type: ignore[no-untyped-def]
+    """Compute the quadrilateral that represents a part, in `scratch`.
 
     Args:
-        light, strata, emitter_parts: of the area light. part_index: index of the part. sample: its only sample, if the
-        part is not flat.
-        shift: sample offset of the shaded point. x, y, z: the shaded point. area: that the part represents, m².
-        corner: relative to the shaded point, written. (4, 3) across: normal of the light at the part, written. (3,)
+        part_index: index of the part. sample: its only sample, if the part is not flat.
+        shift: sample offset of the shaded point. position: of that point. area: that the part represents, m².
     Returns:
         Fraction of the light in its first triangle.
     """
-    if emitter_parts.radius[part_index] < _NOT_FLAT:
-        for k in range(4):
-            corner[k, 0] = emitter_parts.corners[part_index, k, 0] - x
-            corner[k, 1] = emitter_parts.corners[part_index, k, 1] - y
-            corner[k, 2] = emitter_parts.corners[part_index, k, 2] - z
-        across[0], across[1], across[2] = (
-            emitter_parts.normal[part_index, 0],
-            emitter_parts.normal[part_index, 1],
-            emitter_parts.normal[part_index, 2],
-        )
-        return emitter_parts.first_fraction[part_index]
+    parts, corner, normal = area_light.parts, scratch.corner, scratch.normal
+    if parts.radius[part_index] < _NOT_FLAT:
+        for axis in range(3):
+            for k in range(4):
+                corner[k, axis] = parts.corners[part_index, k, axis] - position[axis]
+            normal[axis] = parts.normal[part_index, axis]
+        return parts.first_fraction[part_index]
     # a sample that covers several pieces represents a square of its area
-    dx, dy, dz, distance, _, nx, ny, nz = light_sample(light, strata, sample, shift[0], shift[1], x, y, z)
-    across[0], across[1], across[2] = nx, ny, nz
+    dx, dy, dz, distance, _, nx, ny, nz = light_sample(
+        area_light.light, area_light.strata, sample, shift[0], shift[1], position[0], position[1], position[2]
+    )
+    normal[0], normal[1], normal[2] = nx, ny, nz
     _make_square(distance * dx, distance * dy, distance * dz, nx, ny, nz, _HALF * math.sqrt(area), corner)
     return _HALF
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _list_visible_parts(  # type: ignore[no-untyped-def]
-    frame, position, shift, bits, area_light, scratch, num_triangles, end, light, wi, nodes, irradiance_radius
-):
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _list_visible_parts(position, shift, bits, area_light, scratch, num_triangles, end, listed, triangles):  # type: ignore[no-untyped-def]
     """List the visible parts of an area light; return the triangles and entries so far.
 
     Args:
-        frame: as in `_add_halves`. position: of the point. (3,) shift: of its samples. bits: their visibility.
-        area_light: light, strata, parts and gain, as in `LocalRays`. scratch: from `_scratch`.
-        num_triangles, end, light, wi, nodes, irradiance_radius: as in `_add_halves`.
+        position: of the point. (3,) shift: of its samples. bits: their visibility.
+        num_triangles, end, listed, triangles: as in `_add_halves`.
     """
-    emitter, strata, emitter_parts, gain = area_light
-    corner, across, stack = scratch
-    x, y, z = position[0], position[1], position[2]
-    num, stack_size = strata.uv.shape[0], 1
+    parts, stack = area_light.parts, scratch.stack
+    num, stack_size = area_light.strata.uv.shape[0], 1
     stack[0, 0] = stack[0, 1] = 0
     while stack_size > 0:
         stack_size -= 1
@@ -202,94 +223,45 @@ def _list_visible_parts(  # type: ignore[no-untyped-def]
         num_visible = _count_visible(bits, index * count, count)
         if num_visible == 0:
             continue
-        part_index = ((1 << (2 * level)) - 1) // 3 + index
-        mx, my, mz = (
-            emitter_parts.center[part_index, 0] - x,
-            emitter_parts.center[part_index, 1] - y,
-            emitter_parts.center[part_index, 2] - z,
-        )
-        width = emitter_parts.radius[part_index]
-        is_narrow = width * width <= _NARROW * _NARROW * (mx * mx + my * my + mz * mz)
+        part_index, squared_distance = ((1 << (2 * level)) - 1) // 3 + index, _ZERO
+        for axis in range(3):
+            squared_distance += (parts.center[part_index, axis] - position[axis]) ** 2
+        is_narrow = parts.radius[part_index] ** 2 <= _NARROW * _NARROW * squared_distance
         if count > 1 and (num_visible < count or not is_narrow):
             for child in range(4):
                 stack[stack_size, 0], stack[stack_size, 1] = level + 1, 4 * index + child
                 stack_size += 1
             continue
-        area = emitter.area / np.float32(1 << (2 * level))
-        first_fraction = _outline(
-            emitter, strata, emitter_parts, part_index, index, shift, x, y, z, area, corner, across
-        )
+        area = area_light.light.area / np.float32(1 << (2 * level))
+        first_fraction = _outline(area_light, part_index, index, shift, position, area, scratch)
         num_triangles, end = _add_halves(
-            frame,
-            corner,
-            across,
-            first_fraction,
-            area,
-            gain,
-            emitter.is_two_sided,
-            num_triangles,
-            end,
-            light,
-            wi,
-            nodes,
-            irradiance_radius,
+            first_fraction, area, area_light, scratch, num_triangles, end, listed, triangles
         )
     return num_triangles, end
 
 
-@nb.njit(nogil=True, cache=True)
-def _scratch():  # type: ignore[no-untyped-def]
-    """Allocate memory for corners, a normal, and a stack of parts: three more at each level."""
-    return np.empty((4, 3), np.float32), np.empty(3, np.float32), np.empty((16, 2), np.int64)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def list_area_light(  # type: ignore[no-untyped-def]
-    points, wo, area_light, visible, kinds, support, start, stop, first, light, wi, out, nodes, irradiance_radius
-):
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def list_area_light(points, wo, area_light, visible, support, start, stop, scratch, listed, triangles):  # type: ignore[no-untyped-def]
     """List the parts of an area light that are visible from points [start, stop).
 
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) float32
-        area_light: light, strata, parts and gain, as in `LocalRays`. visible: as in `LocalRays`.
-        kinds, support, first, light, wi, out: as in `relume.transport.light_culling.list_lights`.
-        nodes: corners and edge midpoints of the triangles, written. (M, 6, 3) float32
-        irradiance_radius: irradiance and angular radius (radians) of the triangles, written. (M, 4) float32
+        area_light: `AreaLight`. visible: as in `LocalRays`. support: `CurveSupport`.
+        scratch: from `allocate_scratch`. listed, triangles: `ListedLights` and `AreaTriangles`, written.
     Returns:
         K, the number of entries, and M, the number of triangles.
     """
-    position, normal, tangent, seed, _ = points
-    max_triangles = 2 * area_light[1].uv.shape[0]
-    radius, reach, nearest = (
-        irradiance_radius[:, 3],
-        np.empty(max_triangles, np.float32),
-        np.empty(max_triangles, np.float32),
-    )
-    frame, scratch = np.empty((3, 3), np.float32), _scratch()
-    num_triangles = end = np.int64(0)
+    radius, frame, num_triangles, end = triangles.irradiance_radius[:, 3], scratch.frame, np.int64(0), np.int64(0)
     for p in range(start, stop):
         begin = end
-        first[p - start] = begin
-        (bx, by, bz), (ox, oy, oz) = in_frame(normal[p], tangent[p], wo[p])
+        listed.first[p - start] = begin
+        b, o = in_frame(points.normal[p], points.tangent[p], wo[p])
         for axis in range(3):
-            frame[0, axis], frame[2, axis] = tangent[p, axis], normal[p, axis]
-        frame[1, 0], frame[1, 1], frame[1, 2] = bx, by, bz
-        shift = cranley_patterson_offset(area_light[1], seed[p])
+            frame[0, axis], frame[1, axis], frame[2, axis] = points.tangent[p, axis], b[axis], points.normal[p, axis]
+        shift = cranley_patterson_offset(area_light.strata, points.seed[p])
         num_triangles, end = _list_visible_parts(
-            frame,
-            position[p],
-            shift,
-            visible[p],
-            area_light,
-            scratch,
-            num_triangles,
-            end,
-            light,
-            wi,
-            nodes,
-            irradiance_radius,
+            points.position[p], shift, visible[p], area_light, scratch, num_triangles, end, listed, triangles
         )
-        end = cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
-        out[0, begin:end], out[1, begin:end], out[2, begin:end] = ox, oy, oz
-    first[stop - start] = end
+        end = cull(support, radius, listed, begin, end, o, scratch.cull)
+    listed.first[stop - start] = end
     return end, num_triangles

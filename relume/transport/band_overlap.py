@@ -11,6 +11,7 @@ half the time (docs/adr/0009-numba-and-embree.md). LLVM lowers them to the regis
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numba as nb
@@ -57,7 +58,9 @@ def overlap(a, b, c):  # type: ignore[no-untyped-def]
 _OVERLAP = (types.float32,) * 5  # the return value of `overlap`
 
 
-def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: Any, fall: Any) -> Any:
+def _area_below(
+    builder: ir.IRBuilder, y: ir.Value, low: ir.Value, middle: ir.Value, high: ir.Value, rise: ir.Value, fall: ir.Value
+) -> ir.Value:
     """Return the fraction of a triangle's area with angles below each of eight values y."""
     from_low, to_high = subtract(builder, y, low), subtract(builder, high, y)
     ones, zeros = ir.Constant(VECTOR, [1.0] * NUM), ir.Constant(VECTOR, [0.0] * NUM)
@@ -68,14 +71,14 @@ def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: An
     return builder.select(builder.fcmp_ordered("<=", y, low, flags=FAST), zeros, area)
 
 
-def _areas(builder: Any, band: Any, overlap: Any) -> Any:
+def _areas(builder: ir.IRBuilder, band: ir.Value, overlap: Sequence[ir.Value]) -> ir.Value:
     """Return the fractions of area below the lower ends of bands [band, band + 8)."""
     first = broadcast(builder, builder.sitofp(band, FLOAT))
     starts = sum_values(builder, [first, ir.Constant(VECTOR, [float(k) for k in range(NUM)])])
     return _area_below(builder, starts, *(broadcast(builder, value) for value in overlap))
 
 
-def _band_fractions(builder: Any, band: Any, overlap: Any) -> Any:
+def _band_fractions(builder: ir.IRBuilder, band: ir.Value, overlap: Sequence[ir.Value]) -> ir.Value:
     """Return Δ of bands [band, band + 8)."""
     upper = _areas(builder, builder.add(band, constant_index(1)), overlap)
     return subtract(builder, upper, _areas(builder, band, overlap))
@@ -87,10 +90,10 @@ def deposit(typing_context, out, band, low, middle, high, rise, fall, red, green
 
     Args:
         typing_context: Numba's. out: (3, bands padded by 8) float32. band: first of the eight.
-        low, middle, high, rise, fall: of the triangle, from `overlap`. red, green, blue: its weights.
+        low, middle, high, rise, fall: shape of the triangle, from `overlap`. red, green, blue: its weights.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         array, first, *values = arguments
         out_array, fractions = (
             ArrayPointer(context, builder, signature.args[0], array),
@@ -114,10 +117,10 @@ def mean_over_bands(typing_context, decrements, channel, band, low, middle, high
 
     Args:
         typing_context: Numba's. decrements: c_{j-1} − c_j of a curve. (3, bands padded by 8) float32. channel: its row.
-        band: first of the eight. low, middle, high, rise, fall: of the triangle, from `overlap`.
+        band: first of the eight. low, middle, high, rise, fall: shape of the triangle, from `overlap`.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         array, index, first, *overlap = arguments
         eight = ArrayPointer(context, builder, signature.args[0], array).load_vector(index, first)
         return sum_lanes(builder, multiply(builder, _areas(builder, first, overlap), eight))
@@ -132,10 +135,10 @@ def add_means(typing_context, means, settings, first, band, low, middle, high, r
     Args:
         typing_context: Numba's. means: added to. (settings,) float32, a multiple of eight.
         settings: of a curve. (bands padded by 8, settings) float32. first: first of the eight settings.
-        band: first of the eight bands. low, middle, high, rise, fall: of the triangle, from `overlap`.
+        band: first of the eight bands. low, middle, high, rise, fall: shape of the triangle, from `overlap`.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         means_array, array, first_setting, first_band, *overlap = arguments
         fractions = _band_fractions(builder, first_band, overlap)
         settings = ArrayPointer(context, builder, signature.args[1], array)

@@ -38,9 +38,9 @@ _MAX_ELONGATION = np.float32(3)  # footprint length over width: longer ones sum 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
     """Return the two texels of a row around a coordinate in [0, 1], and the fraction of the second."""
-    x: Any = coordinate * np.float32(count) - np.float32(0.5)
+    x = coordinate * np.float32(count) - np.float32(0.5)
     # floor without a call, for any coordinate
-    low: Any = min(max(np.int32(x + np.float32(1)) - 1, np.int32(-1)), np.int32(count - 1))
+    low = min(max(np.int32(x + np.float32(1)) - 1, np.int32(-1)), np.int32(count - 1))
     fraction = np.float32(x - np.float32(low))
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), fraction
 
@@ -50,8 +50,8 @@ def neighbor_texels(levels, u, v, footprint, texel, weight):  # type: ignore[no-
     """Select texels for trilinear interpolation.
 
     Args:
-        levels: of the BTF. u, v: coordinates, in repeats. footprint: its side, in repeats.
-        texel: indices, written. (8,) int32. weight: of each texel, written. (8,) float32
+        levels: levels of the BTF. u, v: coordinates, in repeats. footprint: its side, in repeats.
+        texel: indices, written. (8,) int32. weight: weight of each texel, written. (8,) float32
     Returns:
         Number of texels: four of each level with a weight.
     """
@@ -74,7 +74,7 @@ def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-unty
         levels, texel, weight: as in `neighbor_texels`. u, v: in [0, 1). level: fractional, see `mip_level`.
     """
     coarsest = levels.shape[0] - 1
-    clamped_level: Any = min(level, np.float32(coarsest))
+    clamped_level = min(level, np.float32(coarsest))
     lower = np.int64(clamped_level)
     level_fraction = np.float32(clamped_level - np.float32(lower))
     num = 0
@@ -127,7 +127,8 @@ def _add_weights(cluster, weight, view, texel, texel_weight, num, sample_weight,
     """Add the weights of texels for one view, by cluster.
 
     Args:
-        cluster, weight: of the BTF. view: its index. texel, texel_weight: see `neighbor_texels`. num: number of texels.
+        cluster, weight: arrays of the BTF. view: its index.
+        texel, texel_weight: see `neighbor_texels`. num: number of texels.
         sample_weight: weight of this footprint sample.
         num_clusters: clusters so far. clusters: their indices, written. (≥ num_clusters + num,) int32
         sums: weights of their means and components, written. (≥ num_clusters + num, ≥ 1 + C)
@@ -156,13 +157,14 @@ def _footprint_samples(levels, heights, footprint_center, x, y, z, slant, out): 
     """Distribute samples along a footprint and look up the relief height of each.
 
     Args:
-        levels: of the BTF. heights, footprint_center: as in `_shade_texels`. x, y, z: view direction. slant: its slant.
+        levels: levels of the BTF. heights, footprint_center: as in `_shade_texels`. x, y, z: view direction.
+        slant: its slant.
         out: u, v and height of each sample, written. (≥ samples, 3)
     Returns:
         Number of samples; width of the footprint.
     """
     num, spacing, width = anisotropic_offsets(footprint_center[2], z, np.float32(max(levels[0, 1], levels[0, 2])))
-    across: Any = np.float32(1) / max(np.float32(math.sqrt(x * x + y * y)), _MIN_COSINE)
+    across = np.float32(1) / max(np.float32(math.sqrt(x * x + y * y)), _MIN_COSINE)
     for k in range(num):
         offset = spacing * across * (np.float32(k) - np.float32(0.5) * np.float32(num - 1))
         out[k, 0], out[k, 1] = footprint_center[0] + offset * x, footprint_center[1] - offset * y
@@ -233,7 +235,7 @@ def texel_rows(
     """Compute the outgoing radiance of points [start, stop), texel by texel.
 
     Args:
-        btf_ref: the BTF and its mapping. lights: of the environment, None for rays alone.
+        btf_ref: the BTF and its mapping. lights: lights of the environment, None for rays alone.
         receivers: all points, with `uv`. start, stop: range of points.
     Returns:
         Outgoing radiance.
@@ -249,8 +251,8 @@ def outgoing_rows(
     """Compute the outgoing radiance of points from binned incident light.
 
     Args:
-        btf_ref: the BTF and its mapping. tables: of the BTF, or from `rotated_tables`.
-        incident: of m points, see `texture_light_rows`.
+        btf_ref: the BTF and its mapping. tables: tables of the BTF, or from `rotated_tables`.
+        incident: incident light of m points, see `texture_light_rows`.
         receivers: all points, with `uv`. start: the first of the m points.
     Returns:
         Outgoing radiance.

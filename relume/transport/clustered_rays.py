@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.math.zernike import num_functions, project
+from relume.math.zernike import basis_functions, num_functions
 from relume.raytrace.gather_rays import RayPattern, lattice_offsets, local_ray, ray_weight
 from relume.transport.direction_bins import DirectionBins
 from relume.transport.outgoing_patch_light import OutgoingLight, incident_along
@@ -26,7 +26,7 @@ def weighted_basis(pattern: RayPattern, seed: int, degree: int) -> Shaped[F32, "
     """Evaluate w_r h_k(ω_r) for each ray, including the cosine.
 
     Args:
-        pattern: of the rays, all cosine-distributed. seed: of the points. degree: of the basis.
+        pattern: pattern of the rays, all cosine-distributed. seed: seed of the points. degree: degree of the basis.
     Raises:
         ValueError: the pattern has glossy rays.
     """
@@ -34,7 +34,7 @@ def weighted_basis(pattern: RayPattern, seed: int, degree: int) -> Shaped[F32, "
         raise ValueError("expected cosine-distributed rays: glossy rays have another direction at each point")
     wi, weight = np.empty((pattern.num_rays, 3), np.float32), np.empty(pattern.num_rays, np.float32)
     _generate_rays(pattern, np.uint32(seed), wi, weight)
-    functions = project(wi.astype(np.float64))[:, : num_functions(degree)]
+    functions = basis_functions(wi.astype(np.float64))[:, : num_functions(degree)]
     return np.ascontiguousarray((functions * weight[:, None]).T, np.float32)
 
 

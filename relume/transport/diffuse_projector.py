@@ -30,8 +30,10 @@ def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: in
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _sum_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # type: ignore[no-untyped-def]
+def _sum_point(n, bits, direction, irradiance, weight, out):  # type: ignore[no-untyped-def]
     """Sum the lights of a point; a separate function so that its loops are vectorized. weight: scratch. (M,)"""
+    (x, y, z), (red, green, blue) = direction, irradiance
+    n_x, n_y, n_z = n[0], n[1], n[2]
     for m in range(weight.shape[0]):
         weight[m] = np.float32((np.int32(bits[m >> 3]) >> np.int32(m & 7)) & np.int32(1))
     for m in range(weight.shape[0]):
@@ -46,34 +48,25 @@ def _sum_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # 
     out[0], out[1], out[2] = r, g, b
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # type: ignore[no-untyped-def]
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def sum_lights(normal, visible, direction, irradiance, start, stop, weight, out):  # type: ignore[no-untyped-def]
     """Sum the visible lights of points [start, stop).
 
     Args:
         normal: of all points. (n, 3) float32. visible: as in `ShadingPoints`. (n, bytes) uint8
-        direction, irradiance: of the lights. (3, M) float32
+        direction, irradiance: of the lights. (3, M) float32. weight: scratch. (M,)
         out: Σ V L Ω cos θi, written. (stop - start, 3) float32
     """
-    _sum(normal, visible, direction, irradiance, start, stop, np.empty(direction.shape[1], np.float32), out)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _sum(normal, visible, direction, irradiance, start, stop, weight, out):  # type: ignore[no-untyped-def]
-    """Implement `sum_lights`. weight: scratch. (M,)"""
-    x, y, z = direction[0], direction[1], direction[2]
-    red, green, blue = irradiance[0], irradiance[1], irradiance[2]
+    by_axis, by_channel = (direction[0], direction[1], direction[2]), (irradiance[0], irradiance[1], irradiance[2])
     for p in range(start, stop):
-        _sum_point(
-            normal[p, 0], normal[p, 1], normal[p, 2], visible[p], x, y, z, red, green, blue, weight, out[p - start]
-        )
+        _sum_point(normal[p], visible[p], by_axis, by_channel, weight, out[p - start])
 
 
 class DiffuseProjector:
     """Shades points of a Lambertian term with constant curves.
 
     Args:
-        term: the term. constant: product of its curves. lights: of the environment.
+        term: the term. constant: product of its curves. lights: lights of the environment.
     """
 
     def __init__(self, term: Term, constant: Shaped[F32, " 3"], lights: TriangleLights) -> None:
@@ -85,5 +78,6 @@ class DiffuseProjector:
         """Return the reflected radiance of receivers [start, stop)."""
         out = np.zeros((stop - start, 3), np.float32)
         if self._direction.shape[1]:  # without lights no visibility is stored
-            sum_lights(receivers.normal, receivers.visible, self._direction, self._irradiance, start, stop, out)
+            light_args, weight = (self._direction, self._irradiance), np.empty(self._direction.shape[1], np.float32)
+            sum_lights(receivers.normal, receivers.visible, *light_args, start, stop, weight, out)
         return out * diffuse_quotients(self._term, receivers, start, stop)[:, None]

@@ -1,4 +1,4 @@
-"""Kernels of gather rays: generate, weight, and list them with their radiance, or sum them at once.
+"""Final gathering: kernels that generate and weight gather rays, and list them with their radiance or sum them.
 
 Loops over all rays of a point write one array each, so that the compiler vectorizes them. Lookups by the patch that a
 ray hits follow in separate loops.
@@ -7,18 +7,44 @@ ray hits follow in separate loops.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import glossy_pdf, lattice_offsets
 from relume.transport.outgoing_patch_light import bin_of
 
+F32 = NDArray[np.float32]
+
 _ZERO, _ONE, _TWO, _HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0.5)
 _PI = np.float32(math.pi)
 _EPSILON, _GROWTH = np.float32(1e-3), np.float32(1 + 1e3)  # of `relume.raytrace.gather_rays`
+
+
+class GatherScratch(NamedTuple):
+    """Scratch memory of a point's rays.
+
+    Attributes:
+        rows, rays: lobes that are hit, and the rays that hit them; one more. local: directions, and for
+            `_generate_rays`. weights: of the rays. entry: of each ray in `ListedRays`.
+    """
+
+    rows: Shaped[NDArray[np.int32], " rays_and_one"]
+    rays: Shaped[NDArray[np.int64], " rays_and_one"]
+    local: Shaped[F32, "5 rays"]
+    weights: Shaped[F32, " rays"]
+    entry: Shaped[NDArray[np.int64], " rays"]
+
+
+def allocate_scratch(num_rays: int) -> GatherScratch:
+    """Allocate scratch memory for a number of rays per point."""
+    rows, rays, entry = np.empty(num_rays + 1, np.int32), np.empty(num_rays + 1, np.int64), np.empty(num_rays, np.int64)
+    return GatherScratch(rows, rays, np.empty((5, num_rays), np.float32), np.empty(num_rays, np.float32), entry)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -105,7 +131,8 @@ def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
     """List the rays of a point that hit a patch with a lobe; return their number. Avoids unpredictable branches.
 
     Args:
-        gather_hits: of the point. (rays,) lobe: of each patch. rows, rays: lobes and rays, written. (> rays,)
+        gather_hits: gather hits of the point. (rays,) lobe: lobe of each patch.
+        rows, rays: lobes and rays, written. (> rays,)
     """
     num = 0
     for ray in range(gather_hits.shape[0]):
@@ -127,36 +154,19 @@ def _table_for(outgoing, num_cosine, weight):  # type: ignore[no-untyped-def]
     return outgoing.smooth if _TWO * np.float32(num_cosine) * weight < _PI else outgoing.table
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def list_gather_rays(  # type: ignore[no-untyped-def]
-    points, wo, gather_hits, pattern, outgoing, start, stop, first, wi, out, irradiance
-):
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def list_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, listed):  # type: ignore[no-untyped-def]
     """List the rays of points [start, stop) that hit a patch, in the points' local frames.
 
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) float32
         gather_hits: patch that each ray hits. (n, rays) uint16. pattern: the rays' directions.
         outgoing: outgoing radiance of the patches, an `OutgoingLight`. start, stop: range of points.
-        first: begin of each point's rays, written. (points + 1,) int64
-        wi: local directions, written. (3, K) float32. out: local wo, written. (3, K) float32
-        irradiance: w · L of each ray, written. (3, K) float32
+        scratch: from `allocate_scratch`. listed: `ListedRays`, written.
     Returns:
         K, the number of rays.
     """
-    num_rays = gather_hits.shape[1]
-    local, weights, entry_index = (
-        np.empty((5, num_rays), np.float32),
-        np.empty(num_rays, np.float32),
-        np.empty(num_rays, np.int64),
-    )
-    scratch = np.empty(num_rays + 1, np.int32), np.empty(num_rays + 1, np.int64), local, weights, entry_index
-    return _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
-    """Implement `list_gather_rays`. scratch: of `_lobes_hit` and `_generate_rays`, and the list index of each ray."""
-    _, normal, tangent, seed, _ = points
+    (_, normal, tangent, seed, _), (first, wi, out, irradiance) = points, listed
     rows, rays, local, weights, entry_index = scratch
     has_lobes, num_rays, end = outgoing.table.shape[0] > 0, gather_hits.shape[1], 0
     for p in range(start, stop):
@@ -185,25 +195,16 @@ def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, firs
     return end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, out):  # type: ignore[no-untyped-def]
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
     """Sum the light of the rays of points [start, stop), if directions do not matter.
 
     Args:
-        points, wo, gather_hits, pattern, outgoing, start, stop: as in `list_gather_rays`.
+        points, wo, gather_hits, pattern, outgoing, start, stop, scratch: as in `list_gather_rays`.
         out: Σ w · L, written. (points, 3) float32
     """
-    num_rays = gather_hits.shape[1]
-    local, weights = np.empty((5, num_rays), np.float32), np.empty(num_rays, np.float32)
-    scratch = np.empty(num_rays + 1, np.int32), np.empty(num_rays + 1, np.int64), local, weights
-    _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
-    """Implement `sum_gather_rays`. scratch: as in `_list`, except the last."""
     _, normal, tangent, seed, _ = points
-    rows, rays, local, weights = scratch
+    rows, rays, local, weights, _ = scratch
     has_lobes, num_rays = outgoing.table.shape[0] > 0, gather_hits.shape[1]
     for p in range(start, stop):
         n, t = normal[p], tangent[p]

@@ -87,9 +87,9 @@ def incident_coefficients(
     """Compute the incident radiance coefficients of points. O(n · (lights + rays) · K) time.
 
     Args:
-        points: n points. visible: of the lights, as in `ShadingPoints`.
+        points: n points. visible: visibility bits of the lights, as in `ShadingPoints`.
         lights: triangles of the environment. rays: all other light.
-        degree: of the basis.
+        degree: degree of the basis.
     Returns:
         t, with the cosine, of the functions up to the degree.
     """
@@ -140,7 +140,7 @@ def add_scaled(
     """Add incident radiance coefficients times a gain per channel to others, in place.
 
     Args:
-        total: added to. addend: of as many functions or fewer.
+        total: added to. addend: coefficients of as many functions or fewer.
         rows: the points that are added; None: all. has_all_rows: `addend` has all n points, not only `rows`.
     """
     target_rows = np.arange(len(total)) if rows is None else rows

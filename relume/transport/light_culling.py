@@ -3,18 +3,52 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.brdf.angles import THETA_D, THETA_H, THETA_I, THETA_R
 from relume.core.numba_options import NO_REFCOUNT
 from relume.math.fast_math import acos_clamped
+from relume.transport.gather_kernel import in_frame
+
+F32 = NDArray[np.float32]
 
 _HALF = np.float32(0.5)
 _ZERO = np.float32(0)
 # float32 holds an arc cosine near one to 5e-4
 _SLACK = np.float32(1e-3)
+
+
+class CurveSupport(NamedTuple):
+    """Angles of curves, and the radians beyond which each curve is zero."""
+
+    kinds: Shaped[NDArray[np.int64], " C"]
+    limit: Shaped[F32, " C"]
+
+
+class ListedLights(NamedTuple):
+    """Memory for K entries: the lights of a range of points, in the points' local frames.
+
+    Attributes:
+        first: begin of each point's entries. light: of each entry; one more, as a kernel may write behind the last.
+        wi, wo: local directions of each entry. Beyond K they are arbitrary.
+    """
+
+    first: Shaped[NDArray[np.int64], " ends"]
+    light: Shaped[NDArray[np.int32], " capacity_and_one"]
+    wi: Shaped[F32, "3 capacity"]
+    wo: Shaped[F32, "3 capacity"]
+
+
+def allocate_list(num_points: int, capacity: int) -> ListedLights:
+    """Allocate memory for the entries of a number of points."""
+    return ListedLights(
+        np.empty(num_points + 1, np.int64), np.empty(capacity + 1, np.int32), *np.empty((2, 3, capacity), np.float32)
+    )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
@@ -68,23 +102,23 @@ def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: igno
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
-    """Remove lights in [begin, end) for which a fixed curve is zero; return the new end.
+def cull(support, radius, listed, begin, end, o, scratch):  # type: ignore[no-untyped-def]
+    """Remove lights in [begin, end) for which a fixed curve is zero; write wo of the others and return their end.
 
     Args:
-        kinds: angles of fixed curves. support: angle beyond which each is zero, radians. (D,)
-        radius: of each light, radians. light: listed lights. wi: local unit directions to these. (3, K)
-        begin, end: of the list. ox, oy, oz: local wo. reach, nearest: scratch. (≥ end − begin,)
+        support: `CurveSupport` of the fixed curves. radius: of each light, radians. listed: `ListedLights`.
+        begin, end: of the list. o: local wo, a tuple. scratch: (2, ≥ end − begin)
     """
-    for k in range(kinds.shape[0]):
-        limit = support[k] + _SLACK
-        if limit > np.float32(math.pi / 2) or not is_bounded(kinds[k]):
+    light, wi, reach, nearest = listed.light, listed.wi, scratch[0], scratch[1]
+    for k in range(support.kinds.shape[0]):
+        limit = support.limit[k] + _SLACK
+        if limit > np.float32(math.pi / 2) or not is_bounded(support.kinds[k]):
             continue
         num = end - begin
         for n in range(num):
             reach[n] = radius[light[begin + n]]
         x, y, z = wi[0, begin:end], wi[1, begin:end], wi[2, begin:end]
-        angle_lower_bounds(kinds[k], reach[:num], x, y, z, ox, oy, oz, nearest)
+        angle_lower_bounds(support.kinds[k], reach[:num], x, y, z, o[0], o[1], o[2], nearest)
         farthest = _ZERO
         for n in range(num):
             farthest = max(farthest, nearest[n])
@@ -96,65 +130,56 @@ def cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, neare
             wi[0, write_index], wi[1, write_index], wi[2, write_index] = x[n], y[n], z[n]
             write_index += nearest[n] <= limit
         end = write_index
+    for axis in range(3):
+        listed.wo[axis, begin:end] = o[axis]
     return end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def list_lights(  # type: ignore[no-untyped-def]
-    normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, first, light, wi, out
-):
-    """List the lights of points [start, stop) in their local frames.
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def scale_by_axes(axes, wo, entry, out):  # type: ignore[no-untyped-def]
+    """Multiply an entry's local wo by the axes of each curve.
 
     Args:
-        normal, tangent: shading frames. wo: view directions. (n, 3) float32
-        visible: light m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
-        directions: mean directions of the lights. (M, 3) float32
-        radius: angular radius of each light about its direction, radians. (M,) float32
-        kinds: angles of the curves. support: radians beyond which each is zero. (C,) float32
-        start, stop: range of points.
-        first: begin of each point's entries, written. (points + 1,) int64
-        light: light of each entry, written. (K + 1,) int32
-        wi: local directions, written. (3, K) float32. out: local wo, written. (3, K) float32
-    Returns:
-        K, the number of entries.
+        axes: of the curves. (C, 3). wo: of `ListedLights`. entry: its index. out: written. (C, 3)
     """
-    reach, nearest = np.empty(len(directions), np.float32), np.empty(len(directions), np.float32)
-    return _list(
-        normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, (reach, nearest),
-        first, light, wi, out,
-    )  # fmt: skip
+    for k in range(axes.shape[0]):
+        for axis in range(3):
+            out[k, axis] = axes[k, axis] * wo[axis, entry]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _list(  # type: ignore[no-untyped-def]
-    normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, scratch, first, light, wi, out
-):
-    """Implement `list_lights`. scratch: of `cull`. (M,) each"""
-    num_lights, (reach, nearest) = directions.shape[0], scratch
-    end = np.int64(0)
-    for p in range(start, stop):
-        begin = end
-        first[p - start] = begin
-        for eight in range(0, num_lights, 8):
-            bits = visible[p, eight >> 3]
+def list_lights(points, wo, visible, directions, radius, support, start, scratch, listed):  # type: ignore[no-untyped-def]
+    """List the visible lights of points [start, start + len(visible)) in their local frames.
+
+    Args:
+        points: `SurfacePoints`. wo: view directions. (n, 3) float32
+        visible: light m of a point in bit m & 7 of byte m >> 3. (points, bytes) uint8
+        directions: mean directions of the lights. (M, 3) float32
+        radius: angular radius of each light about its direction, radians. (M,) float32
+        support: `CurveSupport`. scratch: (2, M). listed: `ListedLights`, written.
+    Returns:
+        K, the number of entries.
+    """
+    light, wi, end = listed.light, listed.wi, np.int64(0)
+    for row in range(visible.shape[0]):
+        begin, p = end, start + row
+        listed.first[row] = begin
+        for eight in range(0, directions.shape[0], 8):
+            bits = visible[row, eight >> 3]
             if bits == 0:  # true for long runs
                 continue
-            for k in range(min(8, num_lights - eight)):
+            for k in range(min(8, directions.shape[0] - eight)):
                 light[end] = eight + k  # overwritten if it is occluded: a branch is mispredicted at shadow edges
                 end += (bits >> k) & 1
-        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
-        tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]
-        bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        for n in range(begin, end):
-            light_index = np.uint64(light[n])
+        b, o = in_frame(points.normal[p], points.tangent[p], wo[p])
+        nx, ny, nz = points.normal[p, 0], points.normal[p, 1], points.normal[p, 2]
+        tx, ty, tz = points.tangent[p, 0], points.tangent[p, 1], points.tangent[p, 2]
+        for entry in range(begin, end):
+            light_index = np.uint64(light[entry])
             x, y, z = directions[light_index, 0], directions[light_index, 1], directions[light_index, 2]
-            wi[0, n] = tx * x + ty * y + tz * z
-            wi[1, n] = bx * x + by * y + bz * z
-            wi[2, n] = nx * x + ny * y + nz * z
-        ox = tx * wo[p, 0] + ty * wo[p, 1] + tz * wo[p, 2]
-        oy = bx * wo[p, 0] + by * wo[p, 1] + bz * wo[p, 2]
-        oz = nx * wo[p, 0] + ny * wo[p, 1] + nz * wo[p, 2]
-        end = cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest)
-        out[0, begin:end], out[1, begin:end], out[2, begin:end] = ox, oy, oz
-    first[stop - start] = end
+            wi[0, entry] = tx * x + ty * y + tz * z
+            wi[1, entry] = b[0] * x + b[1] * y + b[2] * z
+            wi[2, entry] = nx * x + ny * y + nz * z
+        end = cull(support, radius, listed, begin, end, o, scratch)
+    listed.first[visible.shape[0]] = end
     return end

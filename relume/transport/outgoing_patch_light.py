@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.math.direction_grid import SIDE, offsets_in_bin
-from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, num_functions, project
+from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, num_functions
 from relume.patches.patch_kdtree import NO_PATCH
 
 F32 = NDArray[np.float32]
@@ -45,7 +45,7 @@ class OutgoingLight(NamedTuple):
         isotropic: the isotropic part; black in row `NO_PATCH`.
         lobe: row of each patch in the other arrays; −1: isotropic only.
         frame: tangents and bitangents. scale: radiance of one step of the table.
-        table: of each bin, x outermost. smooth: the same, with fewer rings.
+        table: table of each bin, x outermost. smooth: the same, with fewer rings.
     """
 
     isotropic: Shaped[F32, "patches 3"]
@@ -82,8 +82,8 @@ def radiance_from_patch(
     Args:
         isotropic_radiance: as in `OutgoingLight`. rows: patches with a directional part.
         frame: their tangents and bitangents. coefficients: their L_j.
-        decay: of the smoothed table, see `decay_of`; None if only patches look it up, which gather widely: `smooth` is
-            then `table`.
+        decay: decay of the smoothed table, see `decay_of`; None if only patches look it up, which gather widely:
+            `smooth` is then `table`.
         extra_bins: additional binned radiance of some of the G: ascending indices, (F,), and radiance, (F, 3, SIDE²).
     """
     lobe = np.full(NO_PATCH + 1, -1, np.int32)
@@ -124,7 +124,7 @@ def decay_of(roughening: Shaped[F32, " G"]) -> Shaped[F32, " G"]:
 def bin_means() -> Shaped[F32, "J bins"]:
     """Cosine-weighted average of each basis function over each direction bin."""
     wi, weight = offsets_in_bin()  # bins outside the disk take the values of its edge
-    functions = project(wi)[..., :NUM_OUTGOING]
+    functions = basis_functions(wi)[..., :NUM_OUTGOING]
     means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
     return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_OUTGOING).T, np.float32)
 
@@ -134,7 +134,7 @@ def bin_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return the bin of a direction.
 
     Args:
-        frame: of all rows. (G, 2, 3) float32. row: of the patch.
+        frame: frame of all rows. (G, 2, 3) float32. row: row of the patch.
         dx, dy, dz: unit, away from the patch, world space.
     """
     x = frame[row, 0, 0] * dx + frame[row, 0, 1] * dy + frame[row, 0, 2] * dz
@@ -150,7 +150,8 @@ def incident_along(outgoing, gather_hits, bins, out):  # type: ignore[no-untyped
     """Look up the radiance that arrives along the rays of a point.
 
     Args:
-        outgoing: of all patches, an `OutgoingLight`. gather_hits: patches that the rays hit. (rays,) uint16
+        outgoing: outgoing light of all patches, an `OutgoingLight`.
+        gather_hits: patches that the rays hit. (rays,) uint16
         bins: direction bin at the patch. (rays,) uint8
         out: radiance, written. (3, rays) float32
     """

@@ -9,13 +9,20 @@ loop would count references.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.brdf.angles import ALPHA, BETA, compute_alpha_beta, compute_angles
 from relume.core.numba_options import NO_REFCOUNT
-from relume.transport.triangle_kernel import add_subtriangles, weight_subtriangles
+from relume.transport.light_culling import scale_by_axes
+from relume.transport.triangle_kernel import Subtriangles, add_subtriangles, allocate_subtriangles
+
+F32 = NDArray[np.float32]
+I64 = NDArray[np.int64]
 
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)
@@ -38,7 +45,38 @@ _BATCH = 16  # lights divided together
 _LANES = 32
 _MAX_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
 _MAX_SUBTRIANGLES = _BATCH * 4**_MAX_DEPTH
-_SUBTRIANGLES_PER_BATCH = 64  # multiplied by the settings of a curve
+
+
+class Triangles(NamedTuple):
+    """Triangles of a level of division; in `ProjectorScratch.divided`, two levels.
+
+    Attributes:
+        local: unit directions of corners and edge midpoints in the frame of the point. gamma: their angles, bands.
+        origin: entry of the light that each is a part of.
+    """
+
+    local: Shaped[F32, "*levels 3 6 n"]
+    gamma: Shaped[F32, "*levels C 6 n"]
+    origin: Shaped[I64, "*levels n"]
+
+
+class ProjectorScratch(NamedTuple):
+    """Scratch memory of `project_points`.
+
+    Attributes:
+        wo: local, times `Curve.axes`. whole: the listed lights. divided: levels of division, written alternately.
+        lists: indices of triangles that become one subtriangle, four, or are divided further. batches: the last of the
+            listed lights. bend: see `_bends`. bend_sum: see `_sum_bends`.
+    """
+
+    wo: Shaped[F32, "C 3"]
+    whole: Triangles
+    divided: Triangles
+    lists: Shaped[I64, "3 n_and_one"]
+    batches: Shaped[I64, " lights"]
+    bend: Shaped[F32, " n"]
+    bend_sum: Shaped[F32, "C n"]
+    subtriangles: Subtriangles
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
@@ -55,16 +93,16 @@ def _relative_bend(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _rotate_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
+def _rotate_nodes(n, t, nodes, light, local):  # type: ignore[no-untyped-def]
     """Rotate the nodes of listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     for node in range(6):
-        for entry in range(begin, end):
+        for entry in range(light.shape[0]):
             m = np.uint64(light[entry])
             x, y, z = nodes[0, node, m], nodes[1, node, m], nodes[2, node, m]
-            local[0, node, entry - begin] = t[0] * x + t[1] * y + t[2] * z
-            local[1, node, entry - begin] = bx * x + by * y + bz * z
-            local[2, node, entry - begin] = n[0] * x + n[1] * y + n[2] * z
+            local[0, node, entry] = t[0] * x + t[1] * y + t[2] * z
+            local[1, node, entry] = bx * x + by * y + bz * z
+            local[2, node, entry] = n[0] * x + n[1] * y + n[2] * z
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -98,51 +136,38 @@ def _sum_bends(gamma, num, bend_sum):  # type: ignore[no-untyped-def]
             curve_bend_sum[e] = ab[e] + bc[e] + ca[e] - (a[e] + b[e] + c[e])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _append(  # type: ignore[no-untyped-def]
-    gamma,
-    bend_sum,
-    triangle_index,
-    count,
-    nodes,
-    bent,
-    origin,
-    area_fraction,
-    subtriangles,
-    area_fractions,
-    entry_index,
-    num,
-):
+# Inlined like its callers: a call would copy all fields of its arguments, which took an eighth of the projector's time.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _append(triangles, triangle_index, count, nodes, bent, area_fraction, scratch, num):  # type: ignore[no-untyped-def]
     """Append the triangles between three nodes of listed triangles to the subtriangles; return the new number.
 
     Corners move by `bent` times the bend of the angles, which nearly always has one sign
     (docs/direct-light.md#algorithm).
     """
-    for k in range(gamma.shape[0]):
-        curve_bend_sum = bend_sum[k]
+    subtriangles = scratch.subtriangles
+    for k in range(triangles.gamma.shape[0]):
+        curve_bend_sum = scratch.bend_sum[k]
         for corner in range(3):
-            angle, corner_angles = gamma[k, nodes[corner]], subtriangles[k, corner]
+            angle, corner_angles = triangles.gamma[k, nodes[corner]], subtriangles.corners[k, corner]
             for n in range(count):
                 w = np.uint64(triangle_index[n])
                 corner_angles[num + n] = max(angle[w] + bent * curve_bend_sum[w], np.float32(0))
     for n in range(count):
-        entry_index[num + n] = origin[np.uint64(triangle_index[n])]
-    area_fractions[num : num + count] = area_fraction
+        subtriangles.entry[num + n] = triangles.origin[np.uint64(triangle_index[n])]
+    subtriangles.area_fraction[num : num + count] = area_fraction
     return num + count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _classify_triangles(  # type: ignore[no-untyped-def]
-    gamma, bend, bend_sum, num_triangles, level, fine, origin, subtriangles, area_fractions, entry_index, num, lists
-):
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _classify_triangles(triangles, num_triangles, level, fine, scratch, num):  # type: ignore[no-untyped-def]
     """Append triangles with linear angles as one subtriangle, and those that one division makes linear as four.
 
     Args:
-        fine: see `project_points`. origin: light of each triangle.
-        lists: scratch for triangle indices; those to be divided further are left in lists[2].
+        fine: see `project_points`. scratch: has their bends; those to be divided further are left in its third list.
     Returns:
         The new number of subtriangles, and the number of triangles to divide.
     """
+    lists, bend = scratch.lists, scratch.bend
     num_whole = num_quartered = num_divided = 0
     max_whole_bend, last_level = fine
     max_quartered_bend, is_last = _QUARTERED_BEND * max_whole_bend, level == last_level
@@ -155,46 +180,20 @@ def _classify_triangles(  # type: ignore[no-untyped-def]
         num_quartered += is_simple & (not is_whole)
         num_divided += (not is_simple) & (not is_whole)
     area_fraction = _QUARTER**level
-    _sum_bends(gamma, num_triangles, bend_sum)
-    num = _append(
-        gamma,
-        bend_sum,
-        lists[0],
-        num_whole,
-        _WHOLE,
-        _THIRD,
-        origin,
-        area_fraction,
-        subtriangles,
-        area_fractions,
-        entry_index,
-        num,
-    )
+    _sum_bends(triangles.gamma, num_triangles, scratch.bend_sum)
+    num = _append(triangles, lists[0], num_whole, _WHOLE, _THIRD, area_fraction, scratch, num)
     for child in range(4):
         nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
-        child_fraction = _QUARTER * area_fraction
         # a quarter of a triangle has a quarter of the bend
-        bent = _QUARTER * _THIRD
-        num = _append(
-            gamma,
-            bend_sum,
-            lists[1],
-            num_quartered,
-            nodes,
-            bent,
-            origin,
-            child_fraction,
-            subtriangles,
-            area_fractions,
-            entry_index,
-            num,
-        )
+        bent, child_fraction = _QUARTER * _THIRD, _QUARTER * area_fraction
+        num = _append(triangles, lists[1], num_quartered, nodes, bent, child_fraction, scratch, num)
     return num, num_divided
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _children(local, gamma, origin, triangle_index, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
+def _children(triangles, triangle_index, count, children):  # type: ignore[no-untyped-def]
     """Create the four children of the listed triangles: corners and edge midpoints. Return their number."""
+    local, gamma, child_local, child_gamma = triangles.local, triangles.gamma, children.local, children.gamma
     for child in range(4):
         begin = child * count
         for corner in range(3):
@@ -208,7 +207,7 @@ def _children(local, gamma, origin, triangle_index, count, child_local, child_ga
                 for n in range(count):
                     child_values[begin + n] = parent_values[np.uint64(triangle_index[n])]
         for n in range(count):
-            child_origin[begin + n] = origin[np.uint64(triangle_index[n])]
+            children.origin[begin + n] = triangles.origin[np.uint64(triangle_index[n])]
     for edge in range(3):
         next_edge = (edge + 1) % 3
         for n in range(_padded(4 * count)):
@@ -223,12 +222,12 @@ def _children(local, gamma, origin, triangle_index, count, child_local, child_ga
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no-untyped-def]
+def _angles(curves, wo, local, first_node, num, gamma):  # type: ignore[no-untyped-def]
     """Compute the angles of all curves at nodes [first_node, 6) of the first triangles, in bands.
 
     wo: times `Curve.axes`, one for each curve. (C, 3). gamma: (C, 6, …), written.
     """
-    num = _padded(num)
+    kinds, scale, num = curves.kinds, curves.scale, _padded(num)
     is_pair = False  # evaluated with the previous curve
     for k in range(kinds.shape[0]):
         if is_pair:
@@ -245,150 +244,82 @@ def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no
                 compute_angles(kinds[k], scale[k], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _divide(  # type: ignore[no-untyped-def]
-    kinds, scale, wo, support, fine, local, gamma, origin, count, generations, lists, bend, bend_sum, subtriangles,
-    area_fractions, entry_index, num
-):  # fmt: skip
-    """Divide the first `count` triangles of lists[2] recursively until every angle is linear over each.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _divide(curves, fine, triangles, count, scratch, num):  # type: ignore[no-untyped-def]
+    """Divide the first `count` triangles of the third list recursively until every angle is linear over each.
 
-    Args:
-        generations: local, gamma and origin of two generations of divided triangles, written alternately.
     Returns:
         The new number of subtriangles.
     """
-    all_local, all_gamma, all_origin = generations
+    levels = scratch.divided
     for level in range(1, fine[1] + 1):
-        to_local, to_gamma, to_origin = all_local[level & 1], all_gamma[level & 1], all_origin[level & 1]
-        num_children = _children(local, gamma, origin, lists[2], count, to_local, to_gamma, to_origin)
-        _angles(kinds, scale, wo, to_local, _MIDDLES, num_children, to_gamma)
-        _bends(to_gamma, support, num_children, bend)
-        num, count = _classify_triangles(
-            to_gamma,
-            bend,
-            bend_sum,
-            num_children,
-            level,
-            fine,
-            to_origin,
-            subtriangles,
-            area_fractions,
-            entry_index,
-            num,
-            lists,
-        )
-        local, gamma, origin = to_local, to_gamma, to_origin
+        children = Triangles(levels.local[level & 1], levels.gamma[level & 1], levels.origin[level & 1])
+        num_children = _children(triangles, scratch.lists[2], count, children)
+        _angles(curves, scratch.wo, children.local, _MIDDLES, num_children, children.gamma)
+        _bends(children.gamma, curves.support, num_children, scratch.bend)
+        num, count = _classify_triangles(children, num_children, level, fine, scratch, num)
+        triangles = children
     return num
 
 
-@nb.njit(nogil=True, cache=True)
-def make_scratch(num_curves, num_lights, num_settings):  # type: ignore[no-untyped-def]
-    """Allocate the scratch memory of `project_points` once, rather than for every block of points.
+def make_scratch(num_curves: int, num_lights: int, num_settings: int) -> ProjectorScratch:
+    """Allocate the scratch memory of `project_points`.
 
     Args:
-        num_curves: C. num_lights: maximum number of listed triangles. num_settings: see `Contraction`.
+        num_curves: C. num_lights: maximum number of listed triangles. num_settings: columns of `Contraction.settings`.
     """
-    capacity = 4 * num_lights + _MAX_SUBTRIANGLES
-    return _make_light_scratch(num_curves, num_lights), _make_subtriangle_scratch(num_curves, capacity, num_settings)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _make_light_scratch(num_curves, num_lights):  # type: ignore[no-untyped-def]
-    """Allocate memory for lights: local nodes, angles, generations, origins, lists, bends, sums of bends."""
-    capacity = _padded(num_lights)
+    capacity = -(-num_lights // _LANES) * _LANES
     widest = max(capacity, _MAX_DIVIDED)
-    local, gamma = np.zeros((3, 6, capacity), np.float32), np.empty((num_curves, 6, capacity), np.float32)
-    generations = (
+    whole = Triangles(
+        np.zeros((3, 6, capacity), np.float32), np.empty((num_curves, 6, capacity), np.float32), np.arange(widest)
+    )
+    divided = Triangles(
         np.zeros((2, 3, 6, _MAX_DIVIDED), np.float32),
         np.zeros((2, num_curves, 6, _MAX_DIVIDED), np.float32),
         np.empty((2, _MAX_DIVIDED), np.int64),
     )
-    lists, bend = np.empty((3, widest + 1), np.int64), np.empty(widest, np.float32)
-    bend_sum = np.empty((num_curves, widest), np.float32)
-    return local, gamma, generations, np.arange(widest), lists, bend, bend_sum, np.empty(num_lights, np.int64)
+    lists, batches = np.empty((3, widest + 1), np.int64), np.empty(num_lights, np.int64)
+    bend, bend_sum = np.empty(widest, np.float32), np.empty((num_curves, widest), np.float32)
+    subtriangles = allocate_subtriangles(num_curves, 4 * num_lights + _MAX_SUBTRIANGLES, num_settings)
+    wo = np.empty((num_curves, 3), np.float32)
+    return ProjectorScratch(wo, whole, divided, lists, batches, bend, bend_sum, subtriangles)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _make_subtriangle_scratch(num_curves, capacity, num_settings):  # type: ignore[no-untyped-def]
-    """Allocate memory for subtriangles: corners, fractions, entries, overlaps, weights, means and products."""
-    subtriangles, area_fractions = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
-    overlaps, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
-    mean, product = np.empty(num_settings, np.float32), np.empty((_SUBTRIANGLES_PER_BATCH, num_settings), np.float32)
-    return subtriangles, area_fractions, np.empty(capacity, np.int64), overlaps, weight, mean, product
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def project_points(  # type: ignore[no-untyped-def]
-    normal, tangent, first, light, shading, local_wo, nodes, irradiance,
-    kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active, fine, start, stop,
-    scratch,
-    out,
-):  # fmt: skip
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def project_points(points, listed, shading, nodes, irradiance, curves, fine, start, stop, scratch, out):  # type: ignore[no-untyped-def]
     """Project the listed lights of points [start, stop).
 
     Args:
-        normal, tangent: shading frames of all points. (n, 3) float32. start, stop: range of points.
-        first, light, local_wo: from `list_lights`.
+        points: `SurfacePoints`. start, stop: range of points. listed: from `list_lights`.
         shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
         nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
-        kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active: see
-        `Contraction`.
+        curves: `Contraction`.
         fine: tolerance of the bend, relative to exact operators; last level of division. `FINE` or `COARSE`.
         scratch: from `make_scratch`.
         out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
             others.
     """
-    num_curves = kinds.shape[0]
-    scale = np.empty(num_curves, np.float32)
-    for k in range(num_curves):
-        scale[k] = num_bands[k] / (np.pi / 2)
-    local, gamma, generations, origin, lists, bend, bend_sum, divided = scratch[0]
-    subtriangles, area_fractions, entry_index, overlaps, weight, mean, product = scratch[1]
-    capacity = area_fractions.shape[0]
-    scaled_wo = np.empty((num_curves, 3), np.float32)
+    whole, lists, batches, subtriangles = scratch.whole, scratch.lists, scratch.batches, scratch.subtriangles
     for p in range(start, stop):
         row = p - start
-        begin, num_entries = first[row], first[row + 1] - first[row]
+        begin, num_entries = listed.first[row], listed.first[row + 1] - listed.first[row]
         if num_entries == 0:
             continue
-        for k in range(num_curves):
-            for axis in range(3):
-                scaled_wo[k, axis] = axes[k, axis] * local_wo[axis, begin]
-        if num_curves > 0:
-            _rotate_nodes(normal[p], tangent[p], nodes, light, begin, begin + num_entries, local)
-        _angles(kinds, scale, scaled_wo, local, _BEGIN, num_entries, gamma)
-        _bends(gamma, support, num_entries, bend)
-        num, num_divided = _classify_triangles(
-            gamma,
-            bend,
-            bend_sum,
-            num_entries,
-            _BEGIN,
-            fine,
-            origin,
-            subtriangles,
-            area_fractions,
-            entry_index,
-            _BEGIN,
-            lists,
-        )
-        divided[:num_divided] = lists[2, :num_divided]
+        scale_by_axes(curves.axes, listed.wo, begin, scratch.wo)
+        if curves.kinds.shape[0] > 0:
+            light = listed.light[begin : begin + num_entries]
+            _rotate_nodes(points.normal[p], points.tangent[p], nodes, light, whole.local)
+        _angles(curves, scratch.wo, whole.local, _BEGIN, num_entries, whole.gamma)
+        _bends(whole.gamma, curves.support, num_entries, scratch.bend)
+        num, num_divided = _classify_triangles(whole, num_entries, _BEGIN, fine, scratch, _BEGIN)
+        for n in range(num_divided):
+            batches[n] = lists[2, n]
         for batch in range(0, num_divided, _BATCH):
-            if num + _MAX_SUBTRIANGLES > capacity:
-                weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fractions, num, weight)
-                add_subtriangles(
-                    subtriangles, num, num_bands, bands, decrements, num_rows, settings, setting_index, active,
-                    overlaps, weight, mean, product, out[row],
-                )  # fmt: skip
+            if num + _MAX_SUBTRIANGLES > subtriangles.entry.shape[0]:
+                add_subtriangles(subtriangles, num, listed, shading, begin, irradiance, curves, out[row])
                 num = 0
             count = min(_BATCH, num_divided - batch)
-            lists[2, :count] = divided[batch : batch + count]
-            num = _divide(
-                kinds, scale, scaled_wo, support, fine, local, gamma, origin, count, generations, lists, bend, bend_sum,
-                subtriangles, area_fractions, entry_index, num,
-            )  # fmt: skip
-        weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fractions, num, weight)
-        add_subtriangles(
-            subtriangles, num, num_bands, bands, decrements, num_rows, settings, setting_index, active,
-            overlaps, weight, mean, product, out[row],
-        )  # fmt: skip
+            for n in range(count):
+                lists[2, n] = batches[batch + n]
+            num = _divide(curves, fine, whole, count, scratch, num)
+        add_subtriangles(subtriangles, num, listed, shading, begin, irradiance, curves, out[row])

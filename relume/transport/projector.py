@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.core.simd import NUM as EIGHT
 from relume.lights.spherical_triangles import TriangleLights
+from relume.transport.light_culling import ListedLights
 from relume.transport.light_lists import POINTS_PER_BLOCK, AreaLightList, LightList, area_light_lists
 from relume.transport.project_kernel import COARSE, FINE, make_scratch, project_points
 from relume.transport.ray_projector import RayProjector
@@ -22,7 +23,6 @@ from relume.transport.shading_points import ShadingPoints
 from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
-_LightArrays = tuple[NDArray[np.int64], NDArray[np.int32], F32, F32, F32, F32]
 
 
 class Projector:
@@ -58,26 +58,18 @@ class Projector:
     def _add_area_light(self, area_light: AreaLightList, start: int, stop: int, out: F32) -> None:
         for block in range(start, stop, area_light.points_per_block):
             end = min(block + area_light.points_per_block, stop)
-            shading, wo, nodes, irradiance_radius = area_light.list(block, end)
-            by_axis, irradiance = (
-                np.ascontiguousarray(nodes.transpose(2, 1, 0)),
-                np.ascontiguousarray(irradiance_radius[:, :3]),
-            )
-            light_arrays = area_light.first, area_light.light, shading, wo, by_axis, irradiance
-            self._project(light_arrays, block, end, out[block - start : end - start])
+            shading, num = area_light.list(block, end)
+            nodes = np.ascontiguousarray(area_light.triangles.nodes[:num].transpose(2, 1, 0))
+            irradiance = np.ascontiguousarray(area_light.triangles.irradiance_radius[:num, :3])
+            light_args = area_light.listed, shading, nodes, irradiance
+            self._project(light_args, block, end, out[block - start : end - start])
 
     def _block(self, start: int, stop: int, out: F32) -> None:
         light_list = self._light_list
-        shading, wo = light_list.list(start, stop, self._receivers.visible[start:stop])
-        light_arrays = light_list.first, light_list.light, shading, wo, self._lights.nodes, light_list.irradiance
-        self._project(light_arrays, start, stop, out)
+        shading = light_list.list(start, self._receivers.visible[start:stop])
+        self._project((light_list.listed, shading, self._lights.nodes, light_list.irradiance), start, stop, out)
 
-    def _project(self, light_arrays: _LightArrays, start: int, stop: int, out: F32) -> None:
-        """Project a block. light_arrays: arguments `first` to `irradiance` of `project_points`."""
-        r, c = self._receivers, self._contraction
-        project_points(
-            r.normal, r.tangent, *light_arrays,
-            c.kinds, c.axes, c.num_bands, c.bands, c.decrements, c.num_rows, c.settings, c.setting_index, c.support,
-            c.active,
-            self._fine, start, stop, self._scratch, out,
-        )  # fmt: skip
+    def _project(self, light_args: tuple[ListedLights, F32, F32, F32], start: int, stop: int, out: F32) -> None:
+        """Project a block. light_args: `listed` to `irradiance` of `project_points`."""
+        block_args = self._contraction, self._fine, start, stop, self._scratch, out
+        project_points(self._receivers.points, *light_args, *block_args)

@@ -6,10 +6,12 @@ no curve depends on the light direction; otherwise see `relume.transport.area_li
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.brdf.angles import compute_angles
 from relume.core.numba_options import NO_REFCOUNT
@@ -17,27 +19,44 @@ from relume.lights.local_lights import light_sample
 from relume.raytrace.gather_rays import cranley_patterson_offset
 from relume.transport.gather_kernel import in_frame
 
-_NONE = np.int64(-1)  # no curve is free
+F32 = NDArray[np.float32]
+
+
+class RayScratch(NamedTuple):
+    """Scratch memory of a point's rays.
+
+    Attributes:
+        gamma: an angle of each, bands. weight: light, times the fixed curves. band: of each curve.
+        product: of curves at all settings, see `Contraction.settings`.
+    """
+
+    gamma: Shaped[F32, " rays"]
+    weight: Shaped[F32, "3 rays"]
+    band: Shaped[NDArray[np.int64], "C rays"]
+    product: Shaped[F32, " columns"]
+
+
+def allocate_scratch(num_curves: int, max_rays: int, num_columns: int) -> RayScratch:
+    """Allocate scratch memory. max_rays: of a point. num_columns: of `Contraction.settings`."""
+    gamma, weight = np.empty(max_rays, np.float32), np.empty((3, max_rays), np.float32)
+    return RayScratch(gamma, weight, np.zeros((num_curves, max_rays), np.int64), np.empty(num_columns, np.float32))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def list_local_rays(  # type: ignore[no-untyped-def]
-    points, wo, light, strata, gain, visible, start, stop, first, wi, out, irradiance
-):
+def list_local_rays(points, wo, light, strata, gain, visible, start, stop, listed):  # type: ignore[no-untyped-def]
     """List the samples of a local light that are visible from points [start, stop).
 
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) float32
         light, strata, gain, visible: as in `LocalRays`. start, stop: range of points.
-        first, wi, out, irradiance: written, as by `relume.transport.gather_kernel.list_gather_rays`; the irradiance of
-            a ray is w · cos θi · gain.
+        listed: `ListedRays`, written; the irradiance of a ray is w · cos θi · gain.
     Returns:
         K, the number of rays.
     """
     position, normal, tangent, seed, _ = points
-    end = 0
+    wi, end = listed.wi, 0
     for p in range(start, stop):
-        first[p - start] = end
+        listed.first[p - start] = end
         n, t = normal[p], tangent[p]
         (bx, by, bz), (ox, oy, oz) = in_frame(n, t, wo[p])
         shift_u, shift_v = cranley_patterson_offset(strata, seed[p])
@@ -52,30 +71,28 @@ def list_local_rays(  # type: ignore[no-untyped-def]
             if weight <= 0:
                 continue
             wi[0, end], wi[1, end], wi[2, end] = t[0] * dx + t[1] * dy + t[2] * dz, bx * dx + by * dy + bz * dz, z
-            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            listed.wo[0, end], listed.wo[1, end], listed.wo[2, end] = ox, oy, oz
             for channel in range(3):
-                irradiance[channel, end] = weight * gain[channel]
+                listed.irradiance[channel, end] = weight * gain[channel]
             end += 1
-    first[stop - start] = end
+    listed.first[stop - start] = end
     return end
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def list_mirror_lights(  # type: ignore[no-untyped-def]
-    points, wo, direction, normal_irradiance, visible, start, stop, first, wi, out, irradiance
-):
+def list_mirror_lights(points, wo, direction, normal_irradiance, visible, start, stop, listed):  # type: ignore[no-untyped-def]
     """List the lights that points [start, stop) see in planar mirrors.
 
     Args:
         points, wo, start, stop: as in `list_local_rays`. direction, normal_irradiance, visible: as in `MirrorRays`.
-        first, wi, out, irradiance: written, as above; the irradiance of a ray is cos θi · `normal_irradiance`.
+        listed: written, as above; the irradiance of a ray is cos θi · `normal_irradiance`.
     Returns:
         K, the number of rays.
     """
     _, normal, tangent, _, _ = points
-    end = 0
+    wi, end = listed.wi, 0
     for p in range(start, stop):
-        first[p - start] = end
+        listed.first[p - start] = end
         n, t = normal[p], tangent[p]
         (bx, by, bz), (ox, oy, oz) = in_frame(n, t, wo[p])
         for k in range(direction.shape[0]):
@@ -86,17 +103,17 @@ def list_mirror_lights(  # type: ignore[no-untyped-def]
             if z <= 0:
                 continue
             wi[0, end], wi[1, end], wi[2, end] = t[0] * dx + t[1] * dy + t[2] * dz, bx * dx + by * dy + bz * dz, z
-            out[0, end], out[1, end], out[2, end] = ox, oy, oz
+            listed.wo[0, end], listed.wo[1, end], listed.wo[2, end] = ox, oy, oz
             for channel in range(3):
-                irradiance[channel, end] = z * normal_irradiance[k, channel]
+                listed.irradiance[channel, end] = z * normal_irradiance[k, channel]
             end += 1
-    first[stop - start] = end
+    listed.first[stop - start] = end
     return end
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
-    """Multiply the weights of rays by a fixed curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
+    """Multiply the weights of rays by a fixed curve. bands: (3, ≥ J). band: band of each ray. weight: (3, ≥ num)"""
     for channel in range(3):
         row = channel if num_rows == 3 else 0
         for n in range(num):
@@ -104,74 +121,59 @@ def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-de
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _add_settings(settings, setting_index, band, weight, num, product, out):  # type: ignore[no-untyped-def]
-    """Add rays to all settings of the curves with several settings.
-
-    Args:
-        band: of each curve and ray. product: scratch, as long as a row of the settings. out: (3, ≥ N)
-    """
-    num_padded = out.shape[1]
+def _add_settings(curves, scratch, num, out):  # type: ignore[no-untyped-def]
+    """Add rays to all settings of the curves with several settings. out: (3, ≥ N)"""
+    settings, setting_index, product, num_padded = curves.settings, curves.setting_index, scratch.product, out.shape[1]
     blue = settings.shape[2] // num_padded - 1
     for n in range(num):
         product[:] = 1
         for k in range(setting_index.shape[0]):
             if setting_index[k] >= 0:
-                values = settings[setting_index[k], band[k, n]]
+                values = settings[setting_index[k], scratch.band[k, n]]
                 for j in range(product.shape[0]):
                     product[j] *= values[j]
         for channel in range(3):
-            begin, channel_out, ray_weight = (blue * channel // 2) * num_padded, out[channel], weight[channel, n]
+            begin, channel_out = (blue * channel // 2) * num_padded, out[channel]
+            ray_weight = scratch.weight[channel, n]
             for j in range(num_padded):
                 channel_out[j] += ray_weight * product[begin + j]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _contract(  # type: ignore[no-untyped-def]
-    begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, active,
-    gamma, band, weight,
-):  # fmt: skip
-    """Weight rays [begin, end) of a point by all curves except the free one and those with several settings.
-
-    Writes band (curves, ≥ rays) and weight (3, ≥ rays).
-    """
+def _contract(listed, begin, end, shading, curves, scratch):  # type: ignore[no-untyped-def]
+    """Weight rays [begin, end) of a point by all curves except the free one and those with several settings."""
     num, blue_row = end - begin, shading.shape[0] - 1
+    wi, wo, gamma, band, weight = listed.wi, listed.wo, scratch.gamma, scratch.band, scratch.weight
     for channel in range(3):
-        channel_irradiance, quotient, weighted = irradiance[channel], shading[blue_row * channel // 2], weight[channel]
+        irradiance, quotient, weighted = listed.irradiance[channel], shading[blue_row * channel // 2], weight[channel]
         for n in range(num):
-            weighted[n] = channel_irradiance[begin + n] * quotient[begin + n]
-    for k in range(kinds.shape[0]):
-        scale = np.float32(num_bands[k] / (math.pi / 2))
+            weighted[n] = irradiance[begin + n] * quotient[begin + n]
+    for k in range(curves.kinds.shape[0]):
+        axes = curves.axes[k]
         compute_angles(
-            kinds[k], scale, wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
-            axes[k, 0] * wo[0, begin], axes[k, 1] * wo[1, begin], axes[k, 2] * wo[2, begin], gamma[:num],
+            curves.kinds[k], curves.scale[k], wi[0, begin:end], wi[1, begin:end], wi[2, begin:end],
+            axes[0] * wo[0, begin], axes[1] * wo[1, begin], axes[2] * wo[2, begin], gamma[:num],
         )  # fmt: skip
         for n in range(num):
-            band[k, n] = min(np.int64(gamma[n]), num_bands[k] - 1)
-        if k != active and setting_index[k] < 0:
-            _multiply(bands[k], num_rows[k], band[k], weight, num)
+            band[k, n] = min(np.int64(gamma[n]), curves.num_bands[k] - 1)
+        if k != curves.active and curves.setting_index[k] < 0:
+            _multiply(curves.bands[k], curves.num_rows[k], band[k], weight, num)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def weight_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, out):  # type: ignore[no-untyped-def]
-    """Compute the contribution of each listed ray, with all curves contracted.
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def weight_rays(listed, num_points, shading, curves, scratch, out):  # type: ignore[no-untyped-def]
+    """Compute the contribution of each listed ray of the first points, with all curves contracted.
 
     Args:
-        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index: as in
-        `project_rays`.
-        out: written. (3, K) float32
+        listed, shading, curves, scratch: as in `project_rays`. out: written. (3, K) float32
     """
-    max_rays = np.diff(first).max()
-    gamma, weight = np.empty(max_rays, np.float32), np.empty((3, max_rays), np.float32)
-    band = np.empty((kinds.shape[0], max_rays), np.int64)
-    for p in range(first.shape[0] - 1):
-        begin, end = first[p], first[p + 1]
+    for p in range(num_points):
+        begin, end = listed.first[p], listed.first[p + 1]
         if end > begin:
-            _contract(
-                begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, _NONE,
-                gamma, band, weight,
-            )  # fmt: skip
+            _contract(listed, begin, end, shading, curves, scratch)
             for channel in range(3):
-                out[channel, begin:end] = weight[channel, : end - begin]
+                for n in range(end - begin):
+                    out[channel, begin + n] = scratch.weight[channel, n]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -179,7 +181,7 @@ def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
     """Sum listed rays of a term without curves: only its quotient remains.
 
     Args:
-        first, irradiance, shading: as in `project_rays`. out: added to. (points, 3, ≥ 1) float32
+        first, irradiance: of `ListedRays`. shading: as in `project_rays`. out: added to. (points, 3, ≥ 1) float32
     """
     blue_row = shading.shape[0] - 1
     for p in range(out.shape[0]):
@@ -188,52 +190,29 @@ def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
                 out[p, channel, 0] += irradiance[channel, n] * shading[blue_row * channel // 2, n]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def project_rays(  # type: ignore[no-untyped-def]
-    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active, out
-):
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def project_rays(listed, shading, curves, scratch, out):  # type: ignore[no-untyped-def]
     """Add listed rays to their points.
 
     Args:
-        first, wi, wo, irradiance: from `list_gather_rays` or `list_local_rays`; wo is their `out`.
-        shading: quotients, one row for all channels, or three. (1 or 3, K) float32
-        kinds, axes, num_bands, bands, num_rows, settings, setting_index, active: see `Contraction`.
+        listed: `ListedRays`. shading: quotients, one row for all channels, or three. (1 or 3, K) float32
+        curves: `Contraction`. scratch: from `allocate_scratch`.
         out: added to: bands of the free curve, or settings; padded. (points, 3, ≥ J or N) float32
     """
-    max_rays = np.diff(first[: out.shape[0] + 1]).max()
-    gamma, weight = np.empty(max_rays, np.float32), np.empty((3, max_rays), np.float32)
-    band, product = np.zeros((kinds.shape[0], max_rays), np.int64), np.empty(settings.shape[2], np.float32)
-    _project(
-        first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
-        (gamma, weight, band, product), out,
-    )  # fmt: skip
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _project(  # type: ignore[no-untyped-def]
-    first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
-    scratch, out,
-):  # fmt: skip
-    """Implement `project_rays`. scratch: gamma, weight, band of `_contract`, product of `_add_settings`."""
-    gamma, weight, band, product = scratch
     for p in range(out.shape[0]):
-        begin, end = first[p], first[p + 1]
-        num = end - begin
-        if num == 0:
+        begin, end = listed.first[p], listed.first[p + 1]
+        if begin == end:
             continue
-        _contract(
-            begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, active,
-            gamma, band, weight,
-        )  # fmt: skip
-        if active >= 0:
-            for n in range(num):
+        _contract(listed, begin, end, shading, curves, scratch)
+        if curves.active >= 0:
+            for n in range(end - begin):
                 for channel in range(3):
-                    out[p, channel, band[active, n]] += weight[channel, n]
-        elif settings.shape[0] > 0:
-            _add_settings(settings, setting_index, band, weight, num, product, out[p])
+                    out[p, channel, scratch.band[curves.active, n]] += scratch.weight[channel, n]
+        elif curves.settings.shape[0] > 0:
+            _add_settings(curves, scratch, end - begin, out[p])
         else:
             for channel in range(3):
-                channel_weight, total = weight[channel], np.float32(0)
-                for n in range(num):
+                channel_weight, total = scratch.weight[channel], np.float32(0)
+                for n in range(end - begin):
                     total += channel_weight[n]
                 out[p, channel, 0] += total

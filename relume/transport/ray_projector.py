@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.transport.diffuse_projector import diffuse_quotients
-from relume.transport.ray_kernel import project_rays, sum_rays, weight_rays
-from relume.transport.shading_points import GatherRays, RayList, ReceiverList, ShadingPoints, is_area_light
+from relume.transport.ray_kernel import allocate_scratch, project_rays, sum_rays, weight_rays
+from relume.transport.shading_points import GatherRays, RayList, ShadingPoints, allocate_list, is_area_light
 from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
@@ -29,8 +29,9 @@ class RayProjector:
 
     def __init__(self, term: Term, contraction: Contraction, receivers: ShadingPoints, capacity: int) -> None:
         self._term, self._contraction, self._receivers, self._capacity = term, contraction, receivers, capacity
-        max_rays = capacity * max((rays.max_rays_per_point for rays in receivers.rays), default=0)
-        self._ray_list = ReceiverList(np.empty(capacity + 1, np.int64), *np.empty((3, 3, max_rays), np.float32))
+        max_rays = max((rays.max_rays_per_point for rays in receivers.rays), default=0)
+        self._listed = allocate_list(capacity, capacity * max_rays)
+        self._scratch = allocate_scratch(contraction.kinds.size, max_rays, contraction.settings.shape[2])
 
     def add(self, start: int, stop: int, out: Shaped[F32, "m 3 columns"]) -> None:
         """Add points [start, stop) to `out`; see `project_rays` for its layout."""
@@ -65,12 +66,9 @@ class RayProjector:
             last = min(first + self._capacity, stop)
             shading, block_out = self._list(rays, receivers, first, last), out[first - start : last - start]
             if c.kinds.size == 0:
-                sum_rays(self._ray_list.first, self._ray_list.irradiance, shading, block_out)
+                sum_rays(self._listed.first, self._listed.irradiance, shading, block_out)
                 continue
-            project_rays(
-                *self._ray_list, shading,
-                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_index, c.active, block_out,
-            )  # fmt: skip
+            project_rays(self._listed, shading, c, self._scratch, block_out)
 
     def weight_rays(self, start: int, stop: int) -> Shaped[F32, "3 rays"]:
         """Return the contribution of each ray of points [start, stop), with all curves contracted."""
@@ -78,15 +76,10 @@ class RayProjector:
         for rays in self._receivers.rays:
             shading = self._list(rays, self._receivers, start, stop)
             ray_weights.append(np.empty((3, shading.shape[1]), np.float32))
-            ray_list = self._ray_list
-            weight_rays(
-                ray_list.first[: stop - start + 1], ray_list.wi, ray_list.wo, ray_list.irradiance, shading,
-                c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.setting_index, ray_weights[-1],
-            )  # fmt: skip
+            weight_rays(self._listed, stop - start, shading, c, self._scratch, ray_weights[-1])
         return np.concatenate(ray_weights, axis=1) * c.constant[:, None]
 
     def _list(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> F32:
         """List rays of points; return the term's quotients. (1 or 3, rays)"""
-        ray_list = self._ray_list
-        num = rays.list_into(ray_list, receivers, start, stop)
-        return np.asarray(self._term.quotients(*ray_list.wi[:, :num], *ray_list.wo[:, :num]))
+        num = rays.list_into(self._listed, receivers, start, stop)
+        return np.asarray(self._term.quotients(*self._listed.wi[:, :num], *self._listed.wo[:, :num]))

@@ -24,7 +24,7 @@ def at_roughness(bands: Mapping[str, F64], level: int) -> dict[str, F64]:
     """Return the curves at one level, (3, J) each; curves without levels are unchanged.
 
     Args:
-        bands: of each curve, (3, J), or (L, 3, J) if it depends on the level.
+        bands: bands of each curve, (3, J), or (L, 3, J) if it depends on the level.
     """
     return {name: rows[level] if rows.ndim == 3 else rows for name, rows in bands.items()}
 
@@ -58,7 +58,7 @@ def split_by_level(
     """Split points [start, stop) into ranges of one level each.
 
     Args:
-        level: of all points, or None if all have the same.
+        level: roughness levels of all points, or None if all have the same.
         num: number of levels; 1: the range is not split. start, stop: range of points.
     Yields:
         Level, first point, end.

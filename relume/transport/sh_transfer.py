@@ -47,8 +47,8 @@ def transfer_matrices(
     """Compute the transfer matrices T of points.
 
     Args:
-        points: n points. visible: of the lights, as in `ShadingPoints`.
-        directions, solid_angles: of the lights. degree: of the Zernike basis.
+        points: n points. visible: visibility bits of the lights, as in `ShadingPoints`.
+        directions, solid_angles: directions and solid angles of the lights. degree: degree of the Zernike basis.
     """
     values = np.zeros((len(directions), _WIDTH), np.float32)
     values[:, :NUM_HARMONICS] = harmonics(directions.astype(np.float64)) * solid_angles[:, None]
@@ -94,7 +94,7 @@ class ClusteredTransfer(NamedTuple):
 
     Attributes:
         basis: mean, then components of each cluster.
-        cluster: of each point. weight: of the components.
+        cluster: cluster index of each point. weight: weights of the components.
     """
 
     basis: Shaped[F16, "clusters vectors K harmonics"]

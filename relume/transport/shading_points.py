@@ -16,20 +16,29 @@ from relume.lights.local_lights import SURFACE, LocalLight, make_emitter_parts
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.surface_points import SurfacePoints
-from relume.transport.gather_kernel import list_gather_rays, sum_gather_rays
+from relume.transport.gather_kernel import allocate_scratch, list_gather_rays, sum_gather_rays
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.ray_kernel import list_local_rays, list_mirror_lights
 
 F32 = NDArray[np.float32]
 
 
-class ReceiverList(NamedTuple):
-    """Memory for the listed rays of a range of points; see `relume.transport.ray_kernel`."""
+class ListedRays(NamedTuple):
+    """Memory for the K listed rays of a range of points, in the points' local frames.
+
+    Attributes:
+        first: begin of each point's rays. wi: local directions. wo: local wo of each ray's point. irradiance: w · L.
+    """
 
     first: Shaped[NDArray[np.int64], " ends"]
     wi: Shaped[F32, "3 K"]
     wo: Shaped[F32, "3 K"]
     irradiance: Shaped[F32, "3 K"]
+
+
+def allocate_list(num_points: int, max_rays: int) -> ListedRays:
+    """Allocate memory for the rays of a number of points."""
+    return ListedRays(np.empty(num_points + 1, np.int64), *np.empty((3, 3, max_rays), np.float32))
 
 
 class RayList(Protocol):
@@ -44,23 +53,20 @@ class RayList(Protocol):
         """Select the rays of some points, without sharing among neighbors."""
         ...
 
-    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
+    def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of points [start, stop) that carry light; return their number.
 
         Args:
-            receiver_list: memory for the rays, written. receivers: all points. start, stop: range of points.
+            listed: memory for the rays, written. receivers: all points. start, stop: range of points.
         """
         ...
 
 
-def build_ray_lists(rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> ReceiverList:
+def build_ray_lists(rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> ListedRays:
     """List rays in newly allocated memory. See `RayList.list_into`."""
-    max_rays = (stop - start) * rays.max_rays_per_point
-    receiver_list = ReceiverList(
-        np.empty(stop - start + 1, np.int64), *(np.empty((3, max_rays), np.float32) for _ in range(3))
-    )
-    rays.list_into(receiver_list, receivers, start, stop)
-    return receiver_list
+    listed = allocate_list(stop - start, (stop - start) * rays.max_rays_per_point)
+    rays.list_into(listed, receivers, start, stop)
+    return listed
 
 
 @dataclass(frozen=True)
@@ -87,17 +93,16 @@ class GatherRays:
         """Select the rays of some points, without sharing among neighbors."""
         return replace(self, gather_hits=self.gather_hits[rows], sharing=None)
 
-    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `receiver_list`; see `RayList`."""
-        ray_arrays = self.gather_hits, self.pattern, self.outgoing
-        return int(list_gather_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
+    def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
+        ray_args = self.gather_hits, self.pattern, self.outgoing, start, stop, allocate_scratch(self.max_rays_per_point)
+        return int(list_gather_rays(receivers.points, receivers.wo, *ray_args, listed))
 
     def sum(self, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, "m 3"]:
         """Return the irradiance of `receivers` [start, stop) from all of their rays."""
         total = np.empty((stop - start, 3), np.float32)
-        sum_gather_rays(
-            receivers.points, receivers.wo, self.gather_hits, self.pattern, self.outgoing, start, stop, total
-        )
+        ray_args = self.gather_hits, self.pattern, self.outgoing, start, stop, allocate_scratch(self.max_rays_per_point)
+        sum_gather_rays(receivers.points, receivers.wo, *ray_args, total)
         return total
 
 
@@ -106,7 +111,7 @@ class LocalRays:
     """Rays that carry the light of a local light.
 
     Attributes:
-        light: of unit emission. strata: its samples, shifted by the points' seeds.
+        light: light of unit emission. strata: its samples, shifted by the points' seeds.
         gain: factor on the light's unit emission.
         visible: sample k of a point in bit k & 7 of byte k >> 3.
     """
@@ -130,10 +135,10 @@ class LocalRays:
         """Select the rays of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
-    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `receiver_list`; see `RayList`."""
-        ray_arrays = self.light, self.strata, self.gain, self.visible
-        return int(list_local_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
+    def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
+        ray_args = self.light, self.strata, self.gain, self.visible, start, stop
+        return int(list_local_rays(receivers.points, receivers.wo, *ray_args, listed))
 
 
 @dataclass(frozen=True)
@@ -159,10 +164,10 @@ class MirrorRays:
         """Select the rays of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
-    def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of `receivers` [start, stop) into `receiver_list`; see `RayList`."""
-        ray_arrays = self.direction, self.normal_irradiance, self.visible
-        return int(list_mirror_lights(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
+    def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
+        ray_args = self.direction, self.normal_irradiance, self.visible, start, stop
+        return int(list_mirror_lights(receivers.points, receivers.wo, *ray_args, listed))
 
 
 def is_area_light(rays: RayList, num_curves: int) -> TypeGuard[LocalRays]:
@@ -182,7 +187,7 @@ class ShadingPoints:
         visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon.
         rays: light along rays; empty for the environment's triangles alone.
         uv: see `relume.raytrace.surface_interaction.SurfaceInteraction`; None if unknown.
-        level: of roughness, see `relume.transport.roughness_ranges`; None if all have the same.
+        level: level of roughness, see `relume.transport.roughness_ranges`; None if all have the same.
     """
 
     points: SurfacePoints

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,30 +20,30 @@ _FLAT = 1e-12  # band averages of a constant differ by rounding
 
 
 class WholeCurves(NamedTuple):
-    """The curves of a term with none free, as `relume.transport.shading.table_averages` integrates them.
+    """The C curves of a term with none free, as `relume.transport.shading.table_averages` integrates them.
 
     Attributes:
-        kinds, num_rows, num_bands: as in `Contraction`.
+        kinds, axes, scale, num_rows: as in `Contraction`.
         steps: per band: its value; sum of the values from it on; total variation from it on. Summed from the end, where
             curves mostly are small, so that differences of small values stay accurate.
     """
 
     kinds: Shaped[NDArray[np.int64], " C"]
+    axes: Shaped[F32, "C 3"]
+    scale: Shaped[F32, " C"]
     steps: Shaped[F32, "C bands 3 3"]
     num_rows: Shaped[NDArray[np.int64], " C"]
-    num_bands: Shaped[NDArray[np.int64], " C"]
 
 
-@dataclass(frozen=True)
-class Contraction:
+class Contraction(NamedTuple):
     """A term prepared for the kernels: the free curve, and the bands of the fixed curves.
 
     Attributes:
-        kinds: `Angle` of each curve that depends on wi. axes: `Curve.axes` of each.
-        bands: padded by 8, with the last band.
+        kinds: `Angle` of each curve that depends on wi. axes: `Curve.axes` of each. scale: its bands per radian.
+        bands: padded by 8, with the last band. decrements: decrease of each band from the previous one.
         num_rows: 1 if a curve is equal in all channels, else 3.
-        settings: of the V curves with several settings, settings last: N, padded with zeros to a multiple of eight, or
-            three times as many if channels differ.
+        settings: settings of the V curves with several settings, settings last: N, padded with zeros to a multiple of
+            eight, or three times as many if channels differ.
         setting_index: row of each curve in `settings`, -1 for none.
         support: bands beyond which a fixed curve is zero; infinite for the free one.
         constant: product of the curves, if all are flat and none is listed.
@@ -56,7 +54,9 @@ class Contraction:
     kinds: Shaped[NDArray[np.int64], " C"]
     axes: Shaped[F32, "C 3"]
     num_bands: Shaped[NDArray[np.int64], " C"]
+    scale: Shaped[F32, " C"]
     bands: Shaped[F32, "C 3 padded"]
+    decrements: Shaped[F32, "C 3 padded"]
     num_rows: Shaped[NDArray[np.int64], " C"]
     settings: Shaped[F32, "V padded columns"]
     setting_index: Shaped[NDArray[np.int64], " C"]
@@ -70,22 +70,15 @@ class Contraction:
         """Number of projected columns: J of the free curve, or N."""
         return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
 
-    @cached_property
-    def decrements(self) -> Shaped[F32, "C 3 padded"]:
-        """Decrease of each band from the previous one."""
-        bands = self.bands.astype(np.float64)
-        return -np.diff(bands, axis=2, prepend=bands[:, :, :1]).astype(np.float32)
-
-    @cached_property
     def whole(self) -> WholeCurves:
-        """All curves, if none is free and each has one setting."""
+        """Sum all curves, if none is free and each has one setting."""
         steps = np.zeros((*self.bands.shape, 3), np.float32)
         for curve_steps, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
             values = bands[:, :num][:, ::-1]
             variation = np.abs(np.diff(values, axis=1, prepend=values[:, :1]))
             curve_steps[:, :num] = np.stack([values, values.cumsum(axis=1), variation.cumsum(axis=1)], axis=2)[:, ::-1]
         steps[np.abs(steps) < _MIN_STEP] = 0
-        return WholeCurves(self.kinds, steps, self.num_rows, self.num_bands)
+        return WholeCurves(self.kinds, self.axes, self.scale, steps, self.num_rows)
 
 
 def _support(rows: NDArray[np.float64]) -> float:
@@ -116,7 +109,7 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
     """Contract a term; curves of the outgoing angle are omitted (they multiply the finished sample).
 
     Args:
-        term: with these curves. bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings at once
+        term: with these curves. bands: bands of each curve by name. (3, J) float64, or (3, N, J) for N settings at once
         active: the free curve, None to contract all.
     """
     curves = [curve for curve in term.curves if not curve.depends_on_view]
@@ -133,11 +126,15 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
     single_setting = [rows if rows.ndim == 2 else np.zeros((3, rows.shape[2])) for rows in all_bands]
     padded = [np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), mode="edge") for rows in single_setting]
     has_settings = np.array([rows.ndim == 3 for rows in all_bands], bool)
+    all_rows = np.array(padded, np.float32).reshape(len(curves), 3, widest)
+    num_bands = np.array([rows.shape[-1] for rows in all_bands], np.int64)
     return Contraction(
         kinds=np.array([int(curve.angle) for curve in curves], np.int64),
         axes=np.array([curve.axes for curve in curves], np.float32).reshape(-1, 3),
-        num_bands=np.array([rows.shape[-1] for rows in all_bands], np.int64),
-        bands=np.array(padded, np.float32).reshape(len(curves), 3, widest),
+        num_bands=num_bands,
+        scale=np.asarray(num_bands / (np.pi / 2), np.float32),
+        bands=all_rows,
+        decrements=-np.diff(all_rows.astype(np.float64), axis=2, prepend=all_rows[:, :, :1]).astype(np.float32),
         num_rows=np.array([1 if np.all(rows == rows[0]) else 3 for rows in single_setting], np.int64),
         settings=_settings(multiple_settings, widest),
         setting_index=np.where(has_settings, np.cumsum(has_settings) - 1, -1),

@@ -71,7 +71,7 @@ def texture_axes(rotation: float, uv: Shaped[F32, "n 5"]) -> Shaped[F32, "n 4"]:
     """Return the axes of a texture in the shading frames of points, for `to_texture_frame`.
 
     Args:
-        rotation: of the texture, radians. uv: of the points, see `ShadingPoints`.
+        rotation: rotation of the texture, radians. uv: UV coordinates of the points, see `ShadingPoints`.
     """
     cosine, sine = math.cos(rotation), math.sin(rotation)
     x = np.stack([np.cos(uv[:, 3]), np.sin(uv[:, 3])], axis=1)
@@ -86,7 +86,7 @@ def texture_light_rows(
     """Project light onto the direction basis of a BTF in its texture frame.
 
     Args:
-        btf_ref: the BTF and its mapping. lights: of the environment, None for rays alone.
+        btf_ref: the BTF and its mapping. lights: lights of the environment, None for rays alone.
         receivers: all points, with `uv`. start, stop: range of points.
     Returns:
         a of each point, channel and direction; without the cosine.
@@ -118,7 +118,7 @@ def rotated_tables(grid: DirectionGrid, tables: Shaped[F32, "*batch L"], angle: 
     one step of the ring.
 
     Args:
-        grid: of the BTF. tables: see `LocalPcaBtf.tables`. angle: of the additional rotation, radians.
+        grid: grid of the BTF. tables: see `LocalPcaBtf.tables`. angle: angle of the additional rotation, radians.
     """
     rotation = np.zeros((grid.num_directions, grid.num_directions), np.float32)
     for first, stop in zip(grid.first[:-1], grid.first[1:], strict=True):

@@ -77,10 +77,10 @@ def add_term(
     """Add one term of a material to the view's radiance, or overwrite the radiance with it.
 
     Args:
-        image: Σ_j c_j T_j. color: of the term.
-        texture: per sample, None for 1. outgoing: product of the curves of the view angle, None for 1.
-        first: the material's first sample in the view. num: number of its samples. replace: overwrite.
-        radiance: output.
+        image: Σ_j c_j T_j. color: color of the term.
+        texture: texture per sample, None for 1. outgoing: product of the curves of the view angle, None for 1.
+        first: the material's first sample in the view. num: number of its samples.
+        replace: overwrite the radiance instead of adding to it. radiance: radiance of the view's samples, modified.
     """
     outgoing_values = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
     texture_values = texture if texture is not None else np.empty((0, 3), np.float32)

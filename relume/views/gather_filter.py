@@ -5,8 +5,8 @@ weighted mean over the 3 × 3 pixels, of samples on the same smooth part of the 
 weights depend only on positions and normals, so that the mean is linear in lights and materials, for images and
 operators alike.
 
-The reflection in a highlight turns by twice the angle of the normal, so its neighbors need more similar normals
-(docs/indirect-light.md#measured).
+A mirror reflection turns by twice the change of the normal, so highlights are averaged only over samples with more
+similar normals (docs/indirect-light.md#measured).
 """
 
 from __future__ import annotations
@@ -25,12 +25,16 @@ F32 = NDArray[np.float32]
 
 _MIN_NORMAL_COSINE = 0.985  # 10°: larger differences separate smooth parts
 _MIN_HIGHLIGHT_NORMAL_COSINE = 0.9986  # 3°
-_MAX_RISE = 0.2  # distance from the tangent plane, relative to the distance
+_MAX_RISE = 0.2  # distance of a neighbor from the tangent plane, over its distance from the sample
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _max_entries(first, pixel, width):  # type: ignore[no-untyped-def]
-    """Count the samples of the pixels around all samples. first: first sample of each pixel. (pixels + 1,)"""
+    """Upper bound on the filter entries: samples in the 3 × 3 pixels around each sample, summed.
+
+    Args:
+        first: first sample of each pixel, then their number. (pixels + 1,)
+    """
     height, count = (first.shape[0] - 1) // width, 0
     for p in pixel:
         x, y = p % width, p // width
@@ -47,10 +51,12 @@ def _fill_weights(  # type: ignore[no-untyped-def]
     """Compute filter weights between samples.
 
     Args:
-        order, first: samples of pixel p are order[first[p] : first[p + 1]]. pixel: of each sample. (n,) int64
-        position, normal: of each. (n, 3) float32. alpha_sample: of each, or of all; only equal ones are averaged.
-        min_normal_cosine: between the normals of neighbors.
-        starts, column_index, weights: output, compressed rows. (n + 1,), (≥ entries,) each
+        order, first: samples of pixel p are order[first[p] : first[p + 1]].
+        pixel: pixel index of each sample. (n,) int64
+        position, normal: position and normal of each sample. (n, 3) float32
+        alpha_sample: alpha sample of each, or one for all; only samples with equal values are averaged.
+        min_normal_cosine: least cosine between the normals of neighbors that are averaged.
+        starts, column_index, weights: rows of the sparse matrix, written. (n + 1,), (≥ entries,) each
     Returns:
         Number of entries.
     """
@@ -86,13 +92,12 @@ def _fill_weights(  # type: ignore[no-untyped-def]
 def make_neighbor_filter(
     pixel: Shaped[NDArray[np.uint32], " n"], width: int, points: SurfacePoints, num_passes: int = 1
 ) -> NeighborFilter:
-    """Make the filter of a material's samples; its rows sum to one.
+    """Make the filter of a material's samples in O(n) time; its rows sum to one.
 
     Args:
-        pixel: y · width + x of each sample. width: of the image, pixels.
-        points: of the samples.
+        pixel: y · width + x of each sample. width: width of the image, pixels.
+        points: points of the samples.
         num_passes: number of tent filter passes for diffuse light.
-    Cost: O(n) time.
     """
     pixel_index, num_pixels = pixel.astype(np.int64), (int(pixel.max(initial=0)) // width + 1) * width
     order = np.argsort(pixel_index, kind="stable").astype(np.int32)

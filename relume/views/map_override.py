@@ -54,8 +54,8 @@ def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: Ra
     """Override maps of materials of a baked view.
 
     Args:
-        view: the baked view. maps: of each material, None if it uses its own maps.
-        tracer: for rays that the bake did not trace.
+        view: the baked view. maps: map images of each material, None if it uses its own maps.
+        tracer: tracer for rays that the bake did not trace.
     Returns:
         The view; the same object for all callers with the same maps.
     Raises:

@@ -52,14 +52,15 @@ class RayTracer(Protocol):
         """Find the lights that are visible from points.
 
         Args:
-            points: with overridden normals. baked_normals: before the override. baked_bits: visibility above those.
+            points: points with overridden normals. baked_normals: normals before the override.
+            baked_bits: visibility of the lights above the horizons of `baked_normals`.
         """
         ...
 
     def gather_hits(
         self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
     ) -> Shaped[NDArray[np.uint16], "n rays"]:
-        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: of the rays"""
+        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: pattern of the rays"""
         ...
 
     def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
@@ -72,7 +73,7 @@ class PartialHits:
     """Gather hits of samples, some of which are traced.
 
     Attributes:
-        patch: hit by each ray.
+        patch: index of the patch that each ray hits.
         steps: progress.
     """
 
@@ -103,10 +104,13 @@ class MapOverrideStore:
     """Another store's samples of one view under overridden maps; a `StoreReader`.
 
     Args:
-        store: the other store. view: index of the view. rows: row of each sample there. (surface samples,)
-        level: of each sample here. (surface samples,) uint8. ratios: of each material's levels.
-        perturbed: samples with overridden normals, by the first row of their material; in the order here.
-        materials: index of each of those materials. tracer: for their rays. cache, key: for traced rays.
+        store: the other store. view: index of the view.
+        rows: row of each sample in the other store. (surface samples,)
+        level: roughness level of each sample in this store. (surface samples,) uint8
+        ratios: ratios of each material's levels.
+        perturbed: samples with overridden normals, by the first row of their material; in the order of this store.
+        materials: index of each of these materials. tracer: tracer for their rays.
+        cache, key: cache for traced rays, and key of the bake in it.
     """
 
     def __init__(
@@ -137,7 +141,7 @@ class MapOverrideStore:
         return self._level.shape if path == f"{self._prefix}level" else self._store.shape(path)
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Read rows [start, stop) of the array at a path, for the view in the order and with the values here."""
+        """Read rows [start, stop) of the array at a path, in the order and with the values of this store."""
         name = path.removeprefix(self._prefix)
         if name == path or "/" in name:
             return self._store.read(path, start, stop)
@@ -155,7 +159,7 @@ class MapOverrideStore:
         """Read some rows of an array of the view, of one material's samples; rays are traced only for those.
 
         Args:
-            path: of the array. rows: in any order. (k,)
+            path: path of the array. rows: in any order. (k,)
         """
         if len(rows) == 0:
             return self.read(path, 0, 0)

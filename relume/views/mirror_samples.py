@@ -19,12 +19,12 @@ class MirrorSamples(NamedTuple):
     """Samples in mirrors, m of a view's n.
 
     Attributes:
-        sample: their rows, ascending.
+        sample: rows of the samples, ascending.
         order_index: index in the view's `order`.
         throughput: factor of the radiance in its pixel, without mirrors.
         chain: the mirrors on the path.
-        origin: on the last mirror. direction: from there, unit.
-        distance: from there; infinite for the background.
+        origin: point on the last mirror. direction: unit direction from `origin`.
+        distance: distance from `origin`; infinite for the background.
     """
 
     sample: Shaped[NDArray[np.int64], " m"]
@@ -51,8 +51,9 @@ def read_mirror_samples(
     """Read the samples of a view in mirrors; None if there are none.
 
     Args:
-        store: an open store. k: index of the view. order: of its samples, by pixel.
-        sample_throughput: of each sample. num_surface: number of samples on surfaces, which come first.
+        store: an open store. k: index of the view. order: order of its samples, by pixel.
+        sample_throughput: throughput of each sample.
+        num_surface: number of samples on surfaces, which come first.
     Raises:
         ChunkDamagedError: a mirror has a material that does not exist in the scene.
     """

@@ -29,7 +29,7 @@ class PerturbedNormals(NamedTuple):
 
     Attributes:
         normal, tangent, uv, normal_length: as in `relume.raytrace.surface_interaction.SurfaceInteraction`.
-        baked_normal: before the override.
+        baked_normal: normals before the override.
     """
 
     normal: Shaped[F32, "n 3"]
@@ -78,7 +78,7 @@ def perturb_normals(
 
     Args:
         map_: the image. uv: texture coordinates, see `relume.raytrace.surface_interaction.SurfaceInteraction`.
-        smooth: normals without normal mapping. normal, tangent: before the override.
+        smooth: normals without normal mapping. normal, tangent: normals and tangents before the override.
         wo: toward the viewer; the new normals face it.
     Raises:
         NotFoundError, SceneError: the image cannot be loaded.
@@ -101,7 +101,7 @@ def unproject(vector: Shaped[F32, "n 3"], normal: Shaped[F32, "n 3"], smooth: Sh
     """Invert a projection to mapped tangent planes: move vectors along `normal` into the planes orthogonal to `smooth`.
 
     Args:
-        vector: orthogonal to `normal`. normal: mapped, unit. smooth: without normal mapping, unit.
+        vector: orthogonal to `normal`. normal: mapped, unit. smooth: normal without normal mapping, unit.
     """
     cosine = _dot(normal, smooth)
     safe_cosine = np.where(np.abs(cosine) < _MIN_FACING, _MIN_FACING, cosine)

@@ -12,7 +12,7 @@ from relume.views.view import View
 
 F32 = NDArray[np.float32]
 
-_BLOCKS_PER_NORMAL_UNIT = 10.0  # a unit of normal difference counts as so many blocks
+_BLOCKS_PER_NORMAL_UNIT = 10.0  # blocks of distance that count as much as a unit of normal difference
 _MAX_DISTANCE = np.float32(1e30)
 _BLOCK_RADIUS = 2  # search radius in blocks
 
@@ -89,8 +89,8 @@ def _find_nearest(
     """Fill `neighbors` and `weight`, (n, k), of samples [start, stop), by distance of `features`, (n, 5).
 
     Args:
-        features: pixel position and scaled normal. subset_features: of the chosen samples. block_sample: index of the
-            chosen sample in each block, -1 for none.
+        features: pixel position and scaled normal. subset_features: features of the chosen samples.
+        block_sample: index of the chosen sample in each block, -1 for none.
     """
     rows, columns = block_sample.shape
     num_neighbors = neighbors.shape[1]

@@ -79,8 +79,8 @@ def resolve(
     """Sum view samples to the pixels of tiles, in the order of the tiles, each row-major.
 
     Args:
-        view: of the samples. tiles: the pixels.
-        radiance: of every view sample.
+        view: view of the samples. tiles: the pixels.
+        radiance: radiance of every view sample.
         gain: factor of each channel, from the environment's intensity and color: a number or three.
         throughput: factors of the samples, in the view's order; `View.gains`, with those of samples in mirrors.
     """

@@ -24,7 +24,7 @@ class TransferReader(Protocol):
     """A store that can read rows that are not adjacent."""
 
     def read_rows(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
-        """Read some rows of an array. path: of the array. rows: in any order"""
+        """Read some rows of an array. path: path of the array. rows: in any order"""
         ...
 
 
@@ -73,7 +73,7 @@ def read_surface_points(
 
     Args:
         store: an open store. k: index of the view. start, stop: rows of its arrays.
-        seed: of these points.
+        seed: seed of these points.
     """
     names = "position", "normal", "tangent"
     position, normal, tangent = (store.read(f"views/{k}/{name}", start, stop) for name in names)

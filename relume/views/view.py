@@ -55,15 +55,15 @@ class View:
 
     Attributes:
         bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
-        key: of the bake in `cache`.
+        key: key of the bake in `cache`.
         first: samples of pixel p are `order[first[p] : first[p + 1]]`.
         throughput: factor of each sample's radiance in its pixel, in `order`: weight times transmittance of glass; zero
             for samples in mirrors, because the look decides their reflectance. One channel, or 3 with glass or mirrors.
-        origin: of the camera rays to surface samples; one each, or one for all.
+        origin: origins of the camera rays to surface samples; one each, or one for all.
         mirrored: samples in mirrors; None if there are none.
         is_mirrored: surface samples on mirrors whose reflection is in other samples.
-        textures: of each material, the scene's textures that are not 1 everywhere, by name. (n, 3)
-        level: roughness levels, ascending within a material. ratios: of each material's levels.
+        textures: textures of each material, the scene's textures that are not 1 everywhere, by name. (n, 3)
+        level: roughness levels, ascending within a material. ratios: ratios of each material's levels.
         maps: overridden maps of each material, see `relume.views.map_override`; empty if there are none.
         baked_rows: row of each surface sample in baked order; None: in that order.
         overridden: views of the same samples by overridden maps, as long as an image uses them.
@@ -201,7 +201,7 @@ class View:
         """Read an array of the view at some of a material's samples; if rays must be traced, only for those.
 
         Args:
-            name: of the array. material: its index. sample_indices: counted from the material's first.
+            name: name of the array. material: its index. sample_indices: counted from the material's first.
         """
         rows, path = self.rows(material), f"views/{self.index}/{name}"
         if isinstance(self.store, TransferReader):
@@ -315,8 +315,8 @@ def open_view(
     """Read the data of a view that every frame needs; visibility stays in the store until an operator needs it.
 
     Args:
-        store: of the bake. index: of the view.
-        cache: for data shared between frames. key: of the bake in it.
+        store: store of the bake. index: index of the view.
+        cache: cache for data shared between frames. key: key of the bake in `cache`.
         maps: see `View`. rows: `View.baked_rows`.
     Raises:
         ChunkDamagedError: arrays of the store are inconsistent.

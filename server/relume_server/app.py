@@ -43,11 +43,11 @@ from relume_server.lifecycle.connection import Connection
 from relume_server.lifecycle.drain import DrainState
 from relume_server.lifecycle.server import ServerProcess
 from relume_server.lifecycle.websocket_protocol import Socket
-from relume_server.request_limits import Guard
+from relume_server.request_limits import RequestLimits
 from relume_server.runtime.assets import using_asset_stores
 from relume_server.runtime.library import open_library
 from relume_server.schemas.protocol import MAX_MESSAGE_BYTES
-from relume_server.services import OpenBakes, OpenBatches, OpenLibrary, open_bakes, open_batches, open_services
+from relume_server.services import OpenBakes, OpenLibrary, OpenSteps, open_bakes, open_services, open_steps
 from relume_server.settings import Settings
 from relume_server.telemetry.logs.requests import RequestIds
 from relume_server.telemetry.logs.setup import set_up
@@ -85,14 +85,14 @@ def create_app(
     *,
     open_library: OpenLibrary = open_library,
     open_bakes: OpenBakes = open_bakes,
-    open_batches: OpenBatches = open_batches,
+    open_steps: OpenSteps = open_steps,
     clock: Callable[[], float] = time.monotonic,
 ) -> FastAPI:
     """Create the ASGI app; it opens its data at startup and closes it at shutdown.
 
     Args:
         settings: None: from the environment.
-        open_library, open_bakes, open_batches: factories, which tests replace.
+        open_library, open_bakes, open_steps: factories, which tests replace.
         clock: monotonic seconds, for the eviction of unused data.
     """
     settings = settings or Settings()
@@ -102,7 +102,7 @@ def create_app(
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with using_asset_stores(settings.data), using_config(settings.ocio, settings.ocio_space):
             get_config()  # fail at startup if the config is invalid
-            opening = open_services(settings, metrics, drain, open_library, open_bakes, open_batches, clock)
+            opening = open_services(settings, metrics, drain, open_library, open_bakes, open_steps, clock)
             async with opening as services:
                 app.state.services = services
                 yield
@@ -133,7 +133,7 @@ def create_app(
     app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(Conditional)
     app.add_middleware(
-        Guard,
+        RequestLimits,
         allowed_hosts=[*settings.allowed_hosts, settings.host],
         allowed_origins=settings.allowed_origins,
         max_body_bytes=settings.max_body_bytes,

@@ -23,6 +23,7 @@ from relume.core.errors import ProtocolError, RelumeError, is_disk_full
 from relume_server.schemas.protocol import Problem
 from relume_server.validation_errors import list_field_errors
 from relume_worker.database.failures import describe_error, is_unavailable
+from relume_worker.jobs.job import BusyError, NotReadyError, QuotaError
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -45,16 +46,8 @@ CLOSE_NOT_READY = 4409
 CLOSE_DAMAGED = 4410
 
 
-class NotReadyError(RelumeError):
-    """A resource is not in the state that the call needs."""
-
-
 class InUseError(RelumeError):
     """Another object uses the resource."""
-
-
-class BusyError(RelumeError):
-    """The server is at capacity; retrying may succeed."""
 
 
 class NearlyFullError(RelumeError):
@@ -95,10 +88,6 @@ class ForbiddenError(RelumeError):
     """The caller's role does not allow the call."""
 
 
-class QuotaError(RelumeError):
-    """The caller has reached a quota."""
-
-
 class DrainingError(RelumeError):
     """The server is stopping; another server, or this one after its restart, can take the request."""
 
@@ -115,8 +104,8 @@ class KeyReusedError(RelumeError):
     """The idempotency key was used for a different call."""
 
 
-class OpennessError(RelumeError):
-    """The settings would let in more people than they suggest."""
+class UnsafeAccessError(RelumeError):
+    """The settings would give access to more people than they suggest."""
 
 
 class RateError(RelumeError):
@@ -133,7 +122,7 @@ class ErrorMapping:
 
     Attributes:
         slug: last part of the problem's `type`.
-        close_code: of a session that the exception ends.
+        close_code: close code of a session that the exception ends.
     """
 
     status: int
@@ -253,7 +242,7 @@ def http_problem(error: HTTPException, method: str, allowed_methods: Sequence[st
     """Build the problem for a request that the framework rejected: unknown address, wrong method, unreadable body.
 
     Args:
-        error: of the framework. method: of the request. allowed_methods: of the address.
+        error: error of the framework. method: method of the request. allowed_methods: allowed methods of the address.
     """
     status, detail = error.status_code, str(error.detail)
     if status == HTTPStatus.BAD_REQUEST:
@@ -291,7 +280,7 @@ def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
     """Turn every exception of the app into an `application/problem+json` response.
 
     Args:
-        app: to install the handlers in. methods_at: allowed methods of a path.
+        app: application to install the handlers in. methods_at: allowed methods of a path.
     """
 
     async def on_mapped_error(_: Request, error: Exception) -> Response:

@@ -38,7 +38,8 @@ class Idempotency:
     """Middleware for idempotency keys.
 
     Args:
-        app: to protect. store: called for each request, because the store is opened after the app is created.
+        app: application to protect.
+        store: called for each request, because the store is opened after the app is created.
     """
 
     def __init__(self, app: ASGIApp, *, store: Callable[[], IdempotencyStore]) -> None:

@@ -20,7 +20,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from relume.assets.measured.merl import FILE_BYTES
-from relume.core.errors import ParameterError, bytes_text
+from relume.core.errors import Description, ParameterError, bytes_text
 from relume_server.errors import ForbiddenOriginError, TooLargeError, make_problem, problem_response
 
 # up to the setting: a 4K environment is 25 MB, an 8K one about 100
@@ -65,8 +65,8 @@ def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
     return origin_url.scheme in ("http", "https") and origin_url.netloc.lower() == headers.get("host", "").lower()
 
 
-class Guard:
-    """The outermost middleware."""
+class RequestLimits:
+    """Middleware for host, origin and body size; adds the security headers."""
 
     def __init__(
         self,
@@ -108,7 +108,9 @@ class Guard:
             if not is_safe and not origin_is_allowed(headers, self._allowed_origins):
                 return ForbiddenOriginError("requests from other origins are not allowed; see RELUME_ALLOWED_ORIGINS")
             if "\0" in scope["path"] or _NULL.search(scope["query_string"]) is not None:
-                return ParameterError("the address", "contains a null character", "one without %00")
+                return ParameterError(
+                    "the address", Description("a text with a null character"), "an address without %00"
+                )
             length = headers.get("content-length", "0")
             if not length.isdecimal() or int(length[:20]) > self._limit(scope):
                 return self._too_large(scope)

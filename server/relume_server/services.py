@@ -16,23 +16,20 @@ from relume.assets.environments.built_in import load_built_in
 from relume.core.memory_usage import live_bytes
 from relume_server.auth import tables as access_tables  # noqa: F401  like those of persistence
 from relume_server.auth.services import AuthServices
-from relume_server.batch.pool import ProcessPool
 from relume_server.batch.prewarm import Prewarmer
-from relume_server.batch.step import Batches
 from relume_server.batch.thumbnails import Thumbnails
 from relume_server.client_state.resume import ResumeStore
 from relume_server.collaboration.comment_sync import CommentSync
 from relume_server.collaboration.room_lease import RoomLease
 from relume_server.collaboration.rooms import Rooms
+from relume_server.errors import make_problem
 from relume_server.io.import_processes import Importers
-from relume_server.io.import_queue import Intake
+from relume_server.io.import_queue import ImportQueue
 from relume_server.io.import_request import remove_strays
-from relume_server.io.streamed_responses import Answers
-from relume_server.jobs.btf_jobs import BtfQueue
-from relume_server.jobs.comparison_jobs import ComparisonQueue
-from relume_server.jobs.job import Quota
-from relume_server.jobs.job_metrics import count_jobs
-from relume_server.jobs.render_jobs import RenderQueue
+from relume_server.io.streamed_responses import StreamedResponses
+from relume_server.jobs.btf_jobs import BtfJobs
+from relume_server.jobs.comparison_jobs import ComparisonJobs
+from relume_server.jobs.render_jobs import RenderJobs
 from relume_server.lifecycle.drain import DrainState
 from relume_server.persistence.comment_store import CommentStore
 from relume_server.persistence.idempotency import IdempotencyStore
@@ -50,7 +47,11 @@ from relume_server.session.session import SessionServices
 from relume_server.settings import Settings
 from relume_server.telemetry.metrics import Metrics
 from relume_server.telemetry.traces import Traces, open_traces
-from relume_worker.executor import num_cores
+from relume_worker.jobs.job import Quota
+from relume_worker.jobs.job_ledger import JobLedger, count_jobs
+from relume_worker.jobs.job_service import JobService
+from relume_worker.jobs.step import StepExecutor
+from relume_worker.lease import new_owner
 from relume_worker.scenes import get_scene
 from relume_worker.service import BakeService
 from relume_worker.tasks import cached_bytes
@@ -63,8 +64,8 @@ class Services:
     Attributes:
         drain: whether the server is draining. access: users, roles, quotas, and the audit.
         pictures: renders thumbnails, and merges identical concurrent requests.
-        answers: large responses.
-        intake: runs imports, and stores their results.
+        responses: large responses.
+        import_queue: runs imports, and stores their results.
     """
 
     settings: Settings
@@ -76,24 +77,24 @@ class Services:
     shares: ShareStore
     comments: CommentStore
     idempotency: IdempotencyStore
-    renders: RenderQueue
-    comparisons: ComparisonQueue
-    btfs: BtfQueue
+    renders: RenderJobs
+    comparisons: ComparisonJobs
+    btfs: BtfJobs
     threads: Threads
     transfers: TransferPool
     cache_evictor: CacheEvictor
     thumbnails: Thumbnails
     pictures: SingleFlight
-    answers: Answers
+    responses: StreamedResponses
     live: SessionServices
-    intake: Intake
+    import_queue: ImportQueue
 
 
 NUM_PICTURES = 2
 
 OpenLibrary = Callable[[int, int], Library]
 OpenBakes = Callable[[Settings], BakeService]
-OpenBatches = Callable[[Settings, Library], Batches]
+OpenSteps = Callable[[Settings, Library, BakeService], StepExecutor]
 
 
 def open_bakes(settings: Settings) -> BakeService:
@@ -101,11 +102,16 @@ def open_bakes(settings: Settings) -> BakeService:
     return BakeService(settings.data, settings.database_url, settings.scheduler, client_weights=settings.fair_shares)
 
 
-def open_batches(settings: Settings, library: Library) -> Batches:
-    """Create the batch processes, which have a library of their own."""
-    num, num_threads = settings.batch_processes, max(1, num_cores() // settings.batch_processes)
-    limits = settings.batch_bytes, num_threads, settings.batch_nice
-    return ProcessPool(settings.data, num, *limits, settings.idle_seconds)
+def open_steps(settings: Settings, library: Library, bakes: BakeService) -> StepExecutor:
+    """Create the executor of steps, in the worker processes that bake."""
+    # Imported here because they load compiled kernels, which a process that only describes the API does not need.
+    from relume.image_io.ocio.active_config import config_source
+    from relume_server.batch.cluster_steps import ClusterSteps
+    from relume_server.batch.worker_process import ProcessSettings
+
+    limits = settings.import_bytes, settings.import_seconds
+    process = ProcessSettings(str(settings.data.resolve()), settings.batch_bytes, config_source(), *limits)
+    return ClusterSteps(bakes.executors, process, settings.fair_shares)
 
 
 @asynccontextmanager
@@ -115,7 +121,7 @@ async def open_services(
     drain: DrainState,
     open_library: OpenLibrary,
     bakes: OpenBakes,
-    batches: OpenBatches,
+    steps: OpenSteps,
     clock: Callable[[], float],
 ) -> AsyncIterator[Services]:
     """Open all services; close them in reverse order, also after a failure to open one."""
@@ -135,24 +141,25 @@ async def open_services(
         at_end(threads.close)
         service = await asyncio.to_thread(bakes, settings)
         at_end(service.close)
-        batch, sessions = batches(settings, library), service.ledger.sessions
+        executor, sessions = steps(settings, library, service), service.ledger.sessions
         access = AuthServices(sessions, settings)
         transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
-        thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
+        thumbnails = Thumbnails(settings.data / "thumbnails", executor.run)
         at_end(thumbnails.close)
-        at_end(batch.close)  # closed first, because they use the others
-        pictures, answers = SingleFlight(NUM_PICTURES, "relume-picture"), Answers(settings.data)
+        at_end(executor.close)
+        pictures, responses = SingleFlight(NUM_PICTURES, "relume-picture"), StreamedResponses(settings.data)
         at_end(pictures.close)
-        at_end(answers.close)
-        cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes, batch.release)
+        at_end(responses.close)
+        cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes)
         _watch_memory(metrics, library, transfers)
-        _watch_jobs(metrics, settings, service, batch, drain)
+        _watch_jobs(metrics, settings, service, drain)
         await asyncio.to_thread(service.start)
-        queues = _queues(settings, service, batch, access)
-        for queue in queues:
-            at_end(queue.close)
-            queue.start()
-        prewarmer = Prewarmer(settings.data, service.ledger, batch.run, thumbnails, transfers.is_used)
+        jobs = _open_jobs(settings, service, executor)
+        kinds = _open_kinds(settings, jobs, service, access)
+        at_end(kinds.comparisons.close)
+        at_end(jobs.close)
+        jobs.start()
+        prewarmer = Prewarmer(settings.data, service.ledger, executor.run, thumbnails, transfers.is_used)
         at_end(prewarmer.close)
         if settings.prewarm:
             prewarmer.start()
@@ -179,32 +186,37 @@ async def open_services(
             shares=ShareStore(sessions),
             comments=comments,
             idempotency=IdempotencyStore(sessions),
-            **queues._asdict(),
+            **kinds._asdict(),
             threads=threads,
             transfers=transfers,
             cache_evictor=cache_evictor,
             thumbnails=thumbnails,
             pictures=pictures,
-            answers=answers,
+            responses=responses,
             live=_live(settings, metrics, traces, library, threads, service, access, drain, rooms, room_lease),
-            intake=Intake(settings, service.ledger, access.quotas, importers),
+            import_queue=ImportQueue(settings, service.ledger, access.quotas, importers),
         )
 
 
-class _Queues(NamedTuple):
-    """Queues of long work in separate processes."""
+def _open_jobs(settings: Settings, service: BakeService, executor: StepExecutor) -> JobService:
+    quota = Quota(settings.max_queued, settings.max_queued_per_client)
+    ledger = JobLedger(service.ledger.sessions, quota, new_owner())
 
-    renders: RenderQueue
-    comparisons: ComparisonQueue
-    btfs: BtfQueue
+    def error_text(error: Exception) -> str:
+        return make_problem(error).detail
+
+    return JobService(ledger, executor.run, executor.num_places, error_text, settings.fair_shares)
 
 
-def _queues(settings: Settings, service: BakeService, batch: Batches, access: AuthServices) -> _Queues:
-    sessions, quota = (
-        service.ledger.sessions,
-        Quota(settings.max_queued, settings.max_queued_per_client, settings.fair_shares),
-    )
+class _Kinds(NamedTuple):
+    """Kinds of jobs."""
 
+    renders: RenderJobs
+    comparisons: ComparisonJobs
+    btfs: BtfJobs
+
+
+def _open_kinds(settings: Settings, jobs: JobService, service: BakeService, access: AuthServices) -> _Kinds:
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
@@ -214,10 +226,10 @@ def _queues(settings: Settings, service: BakeService, batch: Batches, access: Au
     def on_btf_failed(work: str) -> None:
         access.quotas.set_bytes("btf-job", work, 0)
 
-    return _Queues(
-        RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.set_bytes, "render")),
-        ComparisonQueue(sessions, settings.data, batch.run, quota),
-        BtfQueue(sessions, settings.data, batch.run, quota, on_btf_ready, on_btf_failed),
+    return _Kinds(
+        RenderJobs(jobs, settings.data, scene_name, partial(access.quotas.set_bytes, "render")),
+        ComparisonJobs(jobs, settings.data),
+        BtfJobs(jobs, settings.data, on_btf_ready, on_btf_failed),
     )
 
 
@@ -242,10 +254,10 @@ def _live(
     )
 
 
-def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, batch: Batches, drain: DrainState) -> None:
+def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, drain: DrainState) -> None:
     """Register metrics of running and queued jobs, and of capacity."""
-    metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
-    metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions))
+    metrics.watch_workers(service.workers_resident_bytes)
+    metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions, ("render", "comparison", "btf")))
     metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.min_free_bytes)
 
 

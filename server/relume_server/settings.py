@@ -78,11 +78,11 @@ class Settings(BaseSettings):
         default_factory=_default_cache_bytes, gt=0, description="budget of the cache of results computed from bakes"
     )
     cache_floor_bytes: int = Field(default=64 * 1024**2, ge=0, description="part of it for bakes that are not in use")
-    batch_processes: int = Field(default=1, ge=1, le=64, description="processes for renders and comparisons")
     batch_bytes: int = Field(
-        default_factory=lambda: _default_cache_bytes() // 2, gt=0, description="cache of each batch process"
+        default_factory=lambda: _default_cache_bytes() // 2,
+        gt=0,
+        description="cache of renders and comparisons, in all worker processes of a machine together",
     )
-    batch_nice: int = Field(default=10, ge=0, le=19, description="nice(1) of batch processes")
     prewarm: bool = Field(default=True, description="whether the first image of a new bake is computed in advance")
     max_queued: int = Field(default=100, ge=1, description="queued and running renders, and separately comparisons")
     max_queued_per_user: int | None = Field(

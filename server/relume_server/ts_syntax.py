@@ -10,9 +10,14 @@ from pydantic import BaseModel
 
 
 def interface(name: str, schema: Mapping[str, Any], mode: str) -> str:
-    """Write a model as an interface; defaulted fields are optional in inputs, and required in outputs."""
+    """Write a model as an interface; defaulted fields are optional in inputs, and required in outputs.
+
+    An enum is written as a union of its values.
+    """
     required = set(schema.get("required", ()))
     lines = [f"/** {' '.join(schema['description'].split())} */"] if "description" in schema else []
+    if "enum" in schema:
+        return "\n".join([*lines, f"export type {name} = {ts_type(schema)};"])
     lines.append(f"export interface {name} {{")
     for field, body in schema.get("properties", {}).items():
         optional = "?" if mode == "validation" and field not in required else ""

@@ -17,6 +17,7 @@ from pydantic.json_schema import models_json_schema
 from relume.brdf.term_validation import MAX_CURVE_VALUE, MAX_POINTS
 from relume.core.validation import MAX_COLOR
 from relume.image_io.ocio.lut import GAIN, SIZE
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look import LightLook, Look
 from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
 from relume.look.light_validation import LIGHT_RANGES, default_light
@@ -135,6 +136,7 @@ def generate_protocol() -> str:
     blocks.append(f"export const MAX_COMMENT = {comments.MAX_COMMENT};")
     blocks.append(f"export const LUT_SIZE = {literal(SIZE)};")
     blocks.append(f"export const LUT_GAIN = {literal(GAIN)};")
+    blocks.append(f"/** Worst first. */\nexport const FIDELITIES: Fidelity[] = {literal(list(Fidelity))};")
     for mode, mode_models in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in mode_models], by_alias=True)  # type: ignore[misc]
         blocks.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))

@@ -12,6 +12,8 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from relume.core.errors import count_text
+
 MAX_FIELDS = 20
 _MAX_VALUE_CHARS = 80
 _QUOTED = re.compile(r"'((?:[^'\\]|\\.)*)'")
@@ -64,7 +66,7 @@ def list_field_errors(errors: Sequence[_Error], document: object, *, is_message:
     `detail`.
 
     Args:
-        errors: of pydantic. document: the parsed body or message. is_message: true for a session message.
+        errors: pydantic's errors. document: the parsed body or message. is_message: true for a session message.
     """
     fields: dict[tuple[str, tuple[str | int, ...]], list[_Error]] = defaultdict(list)
     located = [_locate_error(error, document, is_message) for error in errors]
@@ -200,7 +202,7 @@ def format_value(value: object) -> str:
     elif value is None or isinstance(value, bool | int | float):
         text = json.dumps(value)
     elif isinstance(value, Mapping | list | tuple):
-        text = "an object" if isinstance(value, Mapping) else f"a list of {len(value)}"
+        text = "an object" if isinstance(value, Mapping) else f"a list of {count_text(len(value), 'entry', 'entries')}"
     else:
         text = "a file" if hasattr(value, "filename") else "of another type"
     return text if len(text) <= _MAX_VALUE_CHARS else text[: _MAX_VALUE_CHARS - 3] + "..."

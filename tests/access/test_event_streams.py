@@ -17,8 +17,8 @@ from relume_server.auth.identity import Identity
 from relume_server.auth.quotas import Quotas
 from relume_server.auth.roles import Caller, Role
 from relume_server.auth.services import AuthServices
-from relume_server.errors import QuotaError
 from relume_server.settings import Settings
+from relume_worker.jobs.job import QuotaError
 from relume_worker.service import BakeService
 from relume_worker.status import BakeStatus
 

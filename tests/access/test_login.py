@@ -44,7 +44,7 @@ def test_anonymous_callers_are_rejected_everywhere(client: TestClient) -> None:
         assert refused.status_code == 401, (method, path)
         assert refused.headers["www-authenticate"] == "Bearer"
         assert refused.json()["type"] == "urn:relume:problem:login"
-        assert "login required" in refused.json()["detail"]
+        assert "a login is required; send a token" in refused.json()["detail"]
 
 
 def test_viewers_change_nothing(client: TestClient, bearer: Bearer) -> None:

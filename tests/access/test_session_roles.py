@@ -33,7 +33,7 @@ def test_anonymous_callers_cannot_open_a_session(client: TestClient, baked: Bake
     with open_session(client, baked.bake) as session, pytest.raises(ConnectionError) as ended:
         session.receive()
     assert ended.value.args[0] == 4401
-    assert "login required" in ended.value.args[1]
+    assert "a login is required; send a token" in ended.value.args[1]
 
 
 def test_edits_are_in_the_audit_log(client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices) -> None:

@@ -13,10 +13,10 @@ from fastapi.testclient import TestClient
 from server_fakes import SIZE
 from session_client import Baked
 
-from relume_server.auth.exposure import check_openness
+from relume_server.auth.access_check import check_access_settings
 from relume_server.auth.proxies import RESOLVE_INTERVAL_S, Proxies
 from relume_server.auth.services import AuthServices
-from relume_server.errors import OpennessError
+from relume_server.errors import UnsafeAccessError
 from relume_server.settings import Settings
 
 Bearer = Callable[..., dict[str, str]]
@@ -128,8 +128,8 @@ class TestStart:
         ],
     )
     def test_settings_that_trust_too_much_are_rejected(self, given: Any, said: str) -> None:
-        with pytest.raises(OpennessError, match=said):
-            check_openness(Settings(**given))
+        with pytest.raises(UnsafeAccessError, match=said):
+            check_access_settings(Settings(**given))
 
     @pytest.mark.parametrize(
         "given",
@@ -144,7 +144,7 @@ class TestStart:
         ],
     )
     def test_other_settings_are_accepted(self, given: Any) -> None:
-        check_openness(Settings(**given))
+        check_access_settings(Settings(**given))
 
     @pytest.mark.parametrize("text", ["10.0.0.0/33", "a b", "-x", "", "10.0.0"])
     def test_invalid_proxy_addresses_are_rejected(self, text: str) -> None:

@@ -21,13 +21,14 @@ from relume_server.auth import quotas as quotas_module
 from relume_server.auth.reservations import Reservation
 from relume_server.auth.roles import KEY, Caller, Role
 from relume_server.auth.services import AuthServices
-from relume_server.errors import NearlyFullError, QuotaError
+from relume_server.errors import NearlyFullError
 from relume_server.io import upload_middleware
 from relume_server.io.fair_slots import Slots
 from relume_server.io.import_processes import ImportTooLargeError
 from relume_server.io.import_request import ImportRequest, _write_scene
 from relume_server.io.upload_middleware import UploadMiddleware
 from relume_server.settings import Settings
+from relume_worker.jobs.job import QuotaError
 
 Bearer = Callable[..., dict[str, str]]
 SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
@@ -43,7 +44,7 @@ def some_scene(request: ImportRequest) -> str:
 
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", some_scene)
+    monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", some_scene)
 
 
 class Body:
@@ -193,7 +194,7 @@ class TestUnpacking:
 
         settings.max_bytes_per_user = 5_000
         access.quotas.assign_owner("Ann", "scene", "another", 3_000)
-        monkeypatch.setattr(client.app.state.services.intake.importers, "run", unpack)
+        monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", unpack)
         refused = client.post("/api/scenes", files=SCENE, headers=bearer("edit", "Ann"))
         assert (refused.status_code, asked) == (429, [2_000])
         assert "unpacks to more than the 2 kB" in refused.json()["detail"]

@@ -18,9 +18,9 @@ from relume.store.bake_protocol import Recipe
 from relume_server.auth.audit import Audit, Change
 from relume_server.auth.rate_limit import TokenBuckets
 from relume_server.auth.services import AuthServices
-from relume_server.errors import BusyError
 from relume_server.settings import Settings
 from relume_worker.database.models import BakeRow
+from relume_worker.jobs.job import BusyError
 from relume_worker.service import BakeService
 
 Bearer = Callable[..., dict[str, str]]
@@ -33,7 +33,7 @@ SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     """Importing creates the tiny scene without a separate process."""
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)
+    monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", write_tiny_scene)
 
 
 def test_buckets_refill() -> None:
@@ -257,7 +257,7 @@ class TestQueues:
     def test_one_user_fills_at_most_a_quarter_of_a_queue(
         self, client: TestClient, bearer: Bearer, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(client.app.state.services.renders, "_next", lambda: None)  # all wait
+        monkeypatch.setattr(client.app.state.services.renders._service, "_claim_next", lambda: False)  # all wait
         request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "png"}
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         answers = [client.post("/api/renders", json=request, headers=who) for who in (ann, ann, ann, bob)]

@@ -20,7 +20,7 @@ FIXED_NAMES = {
 }  # fmt: skip
 IN_PROCESS = [
     "bandwidth", "incremental", "curve_switch", "accuracy", "swap",
-    "rays", "bake", "store_size", "paper_fig5", "accuracy_terms", "pca",
+    "rays", "bake", "store_size", "paper_fig5", "accuracy_terms", "accuracy_generated", "pca",
     "preview", "curve_switch_terms", "shade",
     "estimators", "sharp_slider", "mesh_files",
     "factorization", "large",

@@ -6,14 +6,6 @@ import numpy as np
 from scipy.integrate import quad
 
 
-def directions(rng, count, min_cosine=0.02):
-    """Uniform unit vectors of the upper hemisphere. (count, 3)"""
-    z = rng.uniform(min_cosine, 1.0, count)
-    phi = rng.uniform(0, 2 * np.pi, count)
-    s = np.sqrt(1 - z * z)
-    return np.stack([s * np.cos(phi), s * np.sin(phi), z], axis=-1)
-
-
 def dot(a, b):
     return np.sum(a * b, axis=-1)
 

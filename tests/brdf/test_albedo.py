@@ -6,14 +6,8 @@ from analytic_terms import ANALYTIC
 
 from relume.brdf.albedo import (
     directional_albedo,
-    drop_normal_map,
-    pack_reflectance,
+    material_reflectance,
     reflectance,
-    unpack_images,
-    unpack_lobes,
-    unpack_mirrors,
-    unpack_normal_map,
-    unpack_reflectance,
 )
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.term_validation import complete_term
@@ -72,12 +66,12 @@ def test_normal_mapping_changes_the_reflectance(roughness):
     terms = [term_of("lambert", (0.5, 0.4, 0.2)), term_of("ggx", roughness=roughness, f0=0.9)]
     terms[0]["texture"] = "image:0123456789abcdef"
     normals = NormalMap("image:fedcba9876543210", 1.5)
-    flat, normal_mapped = pack_reflectance(terms), pack_reflectance(terms, normals)
-    assert (unpack_normal_map(flat), unpack_normal_map(normal_mapped)) == (None, normals)
-    assert normal_mapped not in (flat, pack_reflectance(terms, normals._replace(scale=1.4)))
-    assert drop_normal_map(normal_mapped) == drop_normal_map(flat) == flat
-    assert unpack_images(normal_mapped) == unpack_images(flat) == (terms[0]["texture"], None)
-    assert unpack_lobes(normal_mapped) == unpack_lobes(flat)
-    np.testing.assert_array_equal(unpack_reflectance(normal_mapped), unpack_reflectance(flat))
-    assert bool(unpack_mirrors(flat)) == (roughness < 0.06)
-    assert unpack_mirrors(normal_mapped) == []
+    flat, normal_mapped = material_reflectance(terms), material_reflectance(terms, normals)
+    assert (flat.normals, normal_mapped.normals) == (None, normals)
+    assert normal_mapped not in (flat, material_reflectance(terms, normals._replace(scale=1.4)))
+    assert normal_mapped.with_baked_normals() == flat.with_baked_normals() == flat
+    assert normal_mapped.images == flat.images == (terms[0]["texture"], None)
+    assert normal_mapped.lobes == flat.lobes
+    np.testing.assert_array_equal(normal_mapped.matrix, flat.matrix)
+    assert bool(flat.planar_mirrors) == (roughness < 0.06)
+    assert normal_mapped.planar_mirrors == ()

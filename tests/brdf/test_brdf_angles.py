@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from brdf_closed_forms import directions
+from term_properties import directions
 
 from relume.brdf.angles import angle_at, compute_alpha_beta
 from relume.brdf.evaluate import angles_numpy

@@ -70,6 +70,11 @@ def test_a_curve_passes_through_its_handles():
         assert (after >= 0).all()
 
 
+def test_blended_handles_at_zero_leave_no_negative_band():
+    term, curve = document("sheen", {"roughness": 0.07}, {"handles": [[0.0, 1.0, 0.0], [6.48, 1.0, 0.0]]})
+    assert (curve_bands(term, curve) >= 0).all()
+
+
 def test_no_band_moves_farther_than_the_neighboring_handles():
     rng = np.random.default_rng(9)
     curve = TERMS["cook_torrance"].curve("theta_h")

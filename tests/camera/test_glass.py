@@ -16,16 +16,17 @@ from relume.camera.refraction import MAX_GLASS_HITS, dielectric
 from relume.camera.transparency_layers import trace_layers
 from relume.camera.view_samples import sample_view
 from relume.core.cache import Cache
-from relume.live.fixed_camera.background.coverage import Coverage
+from relume.live.fixed_camera.coverage import Coverage
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.visibility import trace_visibility
 from relume.reference.image import reference_image
 from relume.scene.model import Glass, Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (64, 48)
 EVEN = np.full(1, 0.5, np.float32)

@@ -11,16 +11,17 @@ from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad,
 
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.brdf.fresnel import schlick
-from relume.camera.planar_mirrors import find_flat_mirrors, lights_visible_in_mirrors
+from relume.camera.planar_mirrors import find_planar_mirrors, lights_visible_in_mirrors
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.static_view import StaticViewBuilder
+from relume.live.opened.openers import open_bake, open_transfer
+from relume.live.opened.static_view import StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 F0, COLOR, ALBEDO, ROWS = 0.7, 0.8, 0.6, 64
 MIRROR = Material("Mirror", ({"model": "ggx", "color": [COLOR] * 3, "params": {"roughness": 0.03, "f0": F0}},))
@@ -50,7 +51,7 @@ def test_lights_are_visible_in_mirrors_unless_occluded():
     x, z = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.9, 2.5, 35), np.linspace(-1.5, 1.5, 31)))
     floor = make_surface_points(np.stack([x, 0 * x + 1e-4, z], axis=1), np.tile([0, 1, 0], (len(x), 1)))
     lights = np.array([[0.8, 0.6, 0], [-0.8, 0.6, 0], [0.6, 0.5, 0.62449980]], np.float32)
-    mirrored = lights_visible_in_mirrors(geometry, find_flat_mirrors(hall(lid), geometry), floor, lights)
+    mirrored = lights_visible_in_mirrors(geometry, find_planar_mirrors(hall(lid), geometry), floor, lights)
     visible = np.unpackbits(mirrored.visible, axis=1, bitorder="little")[:, :3].astype(bool)
     for light, of_light in zip(lights.astype(float), visible.T, strict=True):
         going, back = (
@@ -73,7 +74,7 @@ def test_lights_are_visible_in_mirrors_unless_occluded():
 
 def test_curved_normal_mapped_and_rough_mirrors_are_not_planar():
     def planes(scene):
-        return find_flat_mirrors(scene, build_scene_buffers(scene)).num_planes
+        return find_planar_mirrors(scene, build_scene_buffers(scene)).num_planes
 
     scene, behind = hall(), quad("back", [[-1, 0, -2], [-1, 0, 2], [-1, 1, 2], [-1, 1, -2]], 0, tangent=(0, 0, 1))
     rough = {**MIRROR.terms[0], "params": {"roughness": 0.3, "f0": F0}}

@@ -12,14 +12,15 @@ from relume.brdf.fresnel import schlick
 from relume.camera.spectral_split import TintSplit
 from relume.camera.view_samples import sample_view
 from relume.core.cache import Cache
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.alpha_filter import PASS_TINT_GROUPS
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
 from relume.scene.model import Glass, Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (24, 16)
 CLEAR = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.3, "f0": [0.04] * 3}}

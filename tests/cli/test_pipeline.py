@@ -24,6 +24,7 @@ from relume_cli.main import main
 from relume_cli.tokens import open_access
 from relume_server.persistence.look_store import LookStore
 from relume_server.schemas.bodies import BakeBody, DryRunBody, SceneBody
+from relume_worker.database.models import JobRow
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
@@ -86,6 +87,15 @@ def test_list_lines_begin_with_an_identifier(run: Any) -> None:
     for kind in ("materials", "images", "renders"):
         assert run("list", kind, "--json")[:2] == (0, "")
     assert "cornell_box" in [line.split()[0] for line in run("list", "built-ins")[1].splitlines()]
+
+
+def test_render_whose_request_cannot_be_read_is_listed_as_failed(run: Any, tmp_path: Path) -> None:
+    with closing(BakeService(tmp_path)) as service, service.ledger.sessions.begin() as session:
+        session.add(JobRow(kind="render", id="r" * 16, request='{"eye":1}', state="queued", done=0, created=0.0))
+    code, text, _ = run("list", "renders", data=tmp_path)
+    assert (code, text) == (0, f"{'r' * 16}  failed     0 of 1 frames  unknown, png\n")
+    (render,) = parsed(run("list", "renders", "--json", data=tmp_path)[1])
+    assert render["problem"].endswith("; request it again")
 
 
 def test_lists_accept_only_meaningful_filters(run: Any) -> None:
@@ -225,11 +235,11 @@ def test_dry_run_of_a_render_validates_and_writes_nothing(run: Any, tmp_path: Pa
     ("words", "said"),
     [
         (["--look", "Blue", "--look", "Red night", "--output", "x.png"], "{look}"),
-        (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "two would be written to Blue.png"),
+        (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "two would become Blue.png"),
         (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "look with --turntable"),
-        (["--look", "Green", "--output", "x.png"], "folder or saved look; saved looks: 'Blue', 'Red night'"),
+        (["--look", "Green", "--output", "x.png"], "folder or saved look; choose from 'Blue', 'Red night'"),
         (["--look", "/no/look.json", "--output", "x.png"], "--look is '/no/look.json'; give a file that exists"),
-        (["--output", "x.mp4"], "a video needs --turntable"),
+        (["--output", "x.mp4"], "or --turntable N for a video"),
         (["--rotate", "object", "--output", "x.png"], "--rotate is 'object'; give it with --turntable N"),
         (["--fps", "10", "--output", "x.png"], "--fps is 10; give it with --turntable N"),
         (["--turntable", "2", "--output", "x.png"], "a folder for the numbered frames, or a name ending in .mp4"),

@@ -5,18 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from furnace_method import FurnaceMethod
+from furnace_method import FurnaceMethod, FurnaceViews
 from subdivided_shading import shade_with_projector
 from watched_bakes import Bake, Done
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.protocols import CameraMode, OpenBake
-from relume.methods.base import TransferMethod
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import OPENERS, open_bake
+from relume.methods.registry import METHODS
 from relume.scene.model import Camera, Environment, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
-from relume.store.bake_protocol import Recipe
+from relume.store.bake_protocol import BakeMethod, Recipe
+from relume.store.run_bake import bake_in_process
 from relume_worker.status import FREE_CAMERA_METHODS
 
 __all__ = ["shade_with_projector"]  # a fixture
@@ -70,20 +70,21 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 @pytest.fixture(scope="session")
-def method(request: pytest.FixtureRequest) -> Iterator[TransferMethod]:
-    """A method; the tests' own is registered with the same line as the others."""
+def method(request: pytest.FixtureRequest) -> Iterator[BakeMethod]:
+    """A method; the tests' own is registered with the same lines as the others."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(METHODS, FurnaceMethod.name, FurnaceMethod())
+        patch.setitem(OPENERS, FurnaceMethod.name, FurnaceViews.from_store)
         yield METHODS[request.param]
 
 
 @pytest.fixture(scope="session")
-def recipe(method: TransferMethod, scene: Scene) -> Recipe:
+def recipe(method: BakeMethod, scene: Scene) -> Recipe:
     return Recipe(method.name, tuple(camera.name for camera in scene.cameras), SIZE, NUM_LIGHTS, num_probes=NUM_POINTS)
 
 
 @pytest.fixture(scope="session")
-def watched(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Bake:
+def watched(method: BakeMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Bake:
     """An undisturbed bake with a record of its tasks."""
     done: list[Done] = []
     store = tmp_path_factory.mktemp("contract") / "store.zarr"

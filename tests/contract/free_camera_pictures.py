@@ -1,10 +1,9 @@
 """Free-camera pictures for tests."""
 
 from look_edits import add_lights
-from session_edits import make_look
+from session_edits import kind_of, make_look
 
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refine_job import RefineHighlights
 
 
 def make_picture(views, *changes, camera=None, size=(48, 36)):
@@ -27,8 +26,8 @@ def make_watched_picture(views, *changes):
 
 def finish_lighting(picture):
     """Run all pending jobs except the refinement of highlights."""
-    while not isinstance(job := picture.next_job(), RefineHighlights):
-        picture.install(job, run_job(job))
+    while kind_of(job := picture.next_job()) != "highlights":
+        job.apply(run_job(job))
         picture.advance(None)
 
 
@@ -39,6 +38,6 @@ def run_job(job):
 def finish_refinement(picture):
     """Run all pending jobs."""
     while (job := picture.next_job()) is not None:
-        picture.install(job, run_job(job))
+        job.apply(run_job(job))
         picture.advance(None)
     assert picture.advance(None).fidelity == "approximate"

@@ -19,10 +19,10 @@ from session_edits import make_look, relative_rmse
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ChunkDamagedError
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.methods.registry import open_bake
-from relume.methods.spherical_harmonic_transfer import read_harmonic_light
-from relume.methods.store_layout import read_patches
-from relume.store import open_store
+from relume.live.opened.harmonic_light import read_harmonic_light
+from relume.live.opened.openers import open_bake
+from relume.live.opened.stored_patches import read_patches
+from relume.store.reader import open_store
 
 ROUNDED = 1e-4  # float32 sums of one thousand lights in another order
 
@@ -41,7 +41,7 @@ def test_moving_light_is_approximate_and_converges_to_the_unwatched_picture(free
     with pytest.raises(CancelledError):
         job.run(lambda share: None, lambda: True)
     shares = []
-    picture.install(job, job.run(shares.append, lambda: False))
+    job.apply(job.run(shares.append, lambda: False))
     assert shares == sorted(shares)
     assert shares[-1] == 1
     assert picture.next_job() is None
@@ -62,7 +62,7 @@ def test_bakes_without_harmonics_follow_light(baked, free_bake, monkeypatch):
         return picture.image()
 
     harmonic = rough(free_bake)
-    monkeypatch.setattr("relume.methods.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
+    monkeypatch.setattr("relume.live.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
     plain = rough(open_bake(baked, Cache(1 << 30)))
     assert 0 < relative_rmse(harmonic, plain) < 0.04
 
@@ -120,7 +120,7 @@ def test_indirect_light_follows_edits(free_bake, edit, solo):
     stale = picture.image()  # new materials, previous indirect light
     job = picture.next_job()
     assert not job.is_refinement
-    picture.install(job, run_job(job))
+    job.apply(run_job(job))
     assert picture.advance(None).fidelity == "preview"
     image = picture.image()
     finish_lighting(picture)
@@ -147,12 +147,12 @@ def test_edits_and_indirect_light_do_not_wait_for_each_other(free_bake, monkeypa
         job, before = picture.next_job(), picture.image()
         with monkeypatch.context() as nothing_whole:
             nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
-            nothing_whole.setattr("relume.live.free_camera.probe_light.state.update_reflectances", None)
+            nothing_whole.setattr("relume.live.free_camera.probe_light.update_reflectances", None)
             picture.set_look(make_look(free_bake, add_lights(other, set_exponent(step))))
             assert picture.advance(None).changed
         edited = picture.image()
         assert (edited != before).any()
-        picture.install(job, run_job(job))
+        job.apply(run_job(job))
         assert picture.advance(None).changed
         assert (picture.image() != edited).any()
         assert picture.next_job().key != job.key  # for the newer look
@@ -169,10 +169,10 @@ def test_indirect_light_lags_behind_a_rotating_light_and_converges(free_bake):
     assert not job.is_refinement
     picture.set_look(turns[2])
     picture.advance(None)
-    picture.install(job, run_job(job))
+    job.apply(run_job(job))
     picture.advance(None)
     job = picture.next_job()
-    picture.install(job, run_job(job))
+    job.apply(run_job(job))
     assert picture.advance(None).fidelity == "preview"
     assert picture.next_job().is_refinement
     final_image = picture.image()
@@ -195,7 +195,7 @@ def test_moving_camera_has_indirect_light_everywhere(free_bake, moved_camera):
     picture.set_camera(moved_camera, (64, 40))
     picture.advance(None)
     before = picture.image()
-    picture.install(job, run_job(job))
+    job.apply(run_job(job))
     picture.advance(None)
     at_once = FreeCameraPicture(free_bake, "front", is_watched=True)
     at_once.set_look(now)
@@ -227,7 +227,7 @@ def test_shader_blocks_contain_followed_light(free_bake):
     picture.set_look(bounces(set_floor_color, set_exponent(8.0)))
     assert picture.advance(None).fidelity == "preview"
     job = picture.next_job()
-    picture.install(job, run_job(job))
+    job.apply(run_job(job))
     assert picture.advance(None).fidelity == "preview"
     followed = blocks_of(picture)
     finish_refinement(picture)

@@ -79,7 +79,7 @@ def test_highlights_are_refined_when_camera_and_light_stop(free_bake, moved_came
         picture.set_camera(camera, (48, 36))
         picture.advance(None)
     np.testing.assert_array_equal(picture.image(), at_first)
-    picture.install(job, run_job(job))  # for an outdated frame
+    job.apply(run_job(job))  # for an outdated frame
     assert not picture.advance(None).changed
     assert picture.next_job().key != job.key
     coarse, fine = (show(free_bake, direct, replace_terms).image() for show in (make_watched_picture, make_picture))

@@ -18,11 +18,11 @@ from exact_pictures import DERIVED_FOLDERS
 from watched_bakes import Bake
 
 from relume.core.errors import PlanError
-from relume.methods.base import TransferMethod
 from relume.scene.model import Scene
-from relume.store import open_store, publish, run_bake
-from relume.store.bake_protocol import Recipe, Task
-from relume.store.publish import array_paths
+from relume.store import run_bake
+from relume.store.bake_protocol import BakeMethod, Recipe, Task
+from relume.store.publish import array_paths, publish
+from relume.store.reader import open_store
 
 
 def tree_hash(folder: Path) -> str:
@@ -35,15 +35,13 @@ def tree_hash(folder: Path) -> str:
     return digest.hexdigest()
 
 
-def run_elsewhere(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> None:
+def run_elsewhere(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> None:
     """Run a task with a pickled copy of the method, as another process would."""
-    copy: TransferMethod = pickle.loads(pickle.dumps(method))
+    copy: BakeMethod = pickle.loads(pickle.dumps(method))
     run_bake.run_task(copy, scene, recipe, staging, task)
 
 
-def test_plan_is_an_upper_bound_of_the_bake(
-    method: TransferMethod, scene: Scene, recipe: Recipe, watched: Bake
-) -> None:
+def test_plan_is_an_upper_bound_of_the_bake(method: BakeMethod, scene: Scene, recipe: Recipe, watched: Bake) -> None:
     plan, reader = method.plan(scene, recipe), open_store(watched.store)
     paths = [path for path in array_paths(watched.store) if path.split("/")[0] not in DERIVED_FOLDERS]
     stored = sum(reader.read(path).nbytes for path in paths)
@@ -51,7 +49,7 @@ def test_plan_is_an_upper_bound_of_the_bake(
     assert 0 < stored <= plan.store_bytes
 
 
-def test_plan_is_pure(method: TransferMethod, scene: Scene, recipe: Recipe) -> None:
+def test_plan_is_pure(method: BakeMethod, scene: Scene, recipe: Recipe) -> None:
     assert method.plan(scene, recipe) == method.plan(scene, recipe)
     assert json.loads(json.dumps(method.attributes(scene, recipe))) == method.attributes(scene, recipe)
 
@@ -60,15 +58,13 @@ def test_plan_is_pure(method: TransferMethod, scene: Scene, recipe: Recipe) -> N
     "changes", [{"views": ("nowhere",)}, {"views": ()}, {"num_lights": 10**9}, {"num_lights": 0}, {"size": (0, 0)}]
 )
 def test_invalid_recipe_is_rejected_by_the_plan(
-    method: TransferMethod, scene: Scene, recipe: Recipe, changes: dict[str, Any]
+    method: BakeMethod, scene: Scene, recipe: Recipe, changes: dict[str, Any]
 ) -> None:
     with pytest.raises(PlanError):
         method.plan(scene, replace(recipe, **changes))
 
 
-def test_tasks_tile_every_announced_array_once(
-    method: TransferMethod, scene: Scene, recipe: Recipe, watched: Bake
-) -> None:
+def test_tasks_tile_every_announced_array_once(method: BakeMethod, scene: Scene, recipe: Recipe, watched: Bake) -> None:
     store = open_store(watched.store)
     for stage in range(len(method.stages)):
         here = [done for done in watched.done if done.task.stage == stage]
@@ -87,7 +83,7 @@ def test_tasks_tile_every_announced_array_once(
 
 @pytest.mark.slow
 def test_task_order_changes_no_byte(
-    method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
+    method: BakeMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
 ) -> None:
     staging = tmp_path / "staging"
     run_bake.create_staging_store(method, scene, recipe, staging)
@@ -99,7 +95,7 @@ def test_task_order_changes_no_byte(
 
 
 def test_neither_interruption_nor_repetition_changes_a_byte(
-    method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
+    method: BakeMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
 ) -> None:
     staging, done = tmp_path / "staging", set()
 
@@ -126,7 +122,7 @@ def test_neither_interruption_nor_repetition_changes_a_byte(
     assert published("repeated") == tree_hash(baked)
 
 
-def test_single_task_reproduces_its_rows(method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
+def test_single_task_reproduces_its_rows(method: BakeMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
     store = open_store(baked)
     for stage in range(len(method.stages)):
         announced = {spec.path for spec in method.arrays(stage, scene, recipe, store)}
@@ -136,6 +132,6 @@ def test_single_task_reproduces_its_rows(method: TransferMethod, scene: Scene, r
                 np.testing.assert_array_equal(store.read(path, *span), rows)
 
 
-def test_unknown_task_is_an_error(method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
+def test_unknown_task_is_an_error(method: BakeMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
     with pytest.raises(ValueError, match="not in"):
         method.compute(scene, recipe, Task(len(method.stages) - 1, 0, "no such view", 0, 1), open_store(baked))

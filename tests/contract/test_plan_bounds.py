@@ -11,11 +11,10 @@ import pytest
 from foliage import tuft
 from tiny_scenes import quad
 
-from relume.methods.base import TransferMethod
 from relume.methods.registry import METHODS
 from relume.scene.model import Environment, Material, Scene, Texture
 from relume.scene.scene_folder import make_scene
-from relume.store.bake_protocol import Recipe
+from relume.store.bake_protocol import BakeMethod, Recipe
 from relume_bench.plan import measure_use
 from relume_worker.status import FREE_CAMERA_METHODS
 
@@ -46,7 +45,7 @@ def _lit_by(radiance: np.ndarray, material: Material) -> Scene:
     return make_scene("Floor", [floor], [material], tuft(1).cameras, Environment("sky", radiance))
 
 
-def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int]:
+def check(method: BakeMethod, scene: Scene, recipe: Recipe) -> dict[str, int]:
     plan, took = method.plan(scene, recipe), measure_use(scene, recipe)
     assert took["view_samples"] <= plan.num_view_samples
     assert took["rays"] <= plan.num_rays

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 from look_edits import EDITS, LOBE, add_lights, draw_curve, edit_light, edit_transport, set_floor_color
-from session_edits import make_look, relative_rmse, run_next_job
+from session_edits import kind_of, make_look, relative_rmse, run_next_job
 
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ResultUnavailableError
 from relume.live.free_camera.frame import render_frame
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
-from relume.live.free_camera.refinement.refinement_jobs import SparseExactJob, StaticViewJob
-from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.static_view import StaticTracing, StaticViewBuilder
+from relume.live.free_camera.progressive_picture import ProgressivePicture
+from relume.live.opened.openers import open_bake, open_transfer
+from relume.live.opened.static_view import StaticTracing, StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.custom_camera import with_cameras
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (64, 40)
 
@@ -108,7 +108,7 @@ def test_edits_continue_in_the_static_view_and_pending_edits_are_applied(picture
     direct = edit_transport(show="direct")
     picture.set_look(make_look(free_bake, add_lights(set_floor_color, direct)))
     picture.prepare(LOBE)
-    picture.install(job, made)
+    job.apply(made)
     assert finish_jobs(picture).exact
     expected = render_image(fixed, "front", make_look(free_bake, add_lights(set_floor_color, direct)))
     assert relative_rmse(picture.image(), expected) < 1e-5
@@ -126,12 +126,12 @@ def test_static_view_of_an_earlier_camera_is_discarded(picture, free_bake):
     made = job.run(lambda share: None, lambda: False)
     picture.set_camera(free_bake.views["front"].camera, SIZE)
     assert picture.next_job().key != job.key
-    picture.install(job, made)
+    job.apply(made)
     assert picture.advance(None).fidelity == "approximate"
 
 
 def test_static_view_reports_progress_and_resumes(picture, monkeypatch):
-    monkeypatch.setattr("relume.methods.static_view._ROWS_PER_TASK", 512)
+    monkeypatch.setattr("relume.live.opened.static_view._ROWS_PER_TASK", 512)
     job, shares = picture.next_job(), []
     with pytest.raises(CancelledError):
         job.run(shares.append, lambda: len(shares) > 3)
@@ -159,7 +159,7 @@ def test_static_view_starts_only_if_the_camera_is_idle(picture, moved_camera):
     assert picture.advance(None).fidelity == "approximate"
     assert picture.next_job() is None
     picture.set_camera(moved_camera, SIZE, is_idle=True)
-    assert isinstance(picture.next_job(), StaticViewJob)
+    assert kind_of(picture.next_job()) == "static view"
 
 
 def test_free_camera_picture_remains_without_memory_for_a_static_view(baked, scene, moved_camera):
@@ -186,14 +186,14 @@ def sparse_samples(picture, moved_camera, monkeypatch):
         is_hit = visible.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
-    for user in ("free_camera_picture", "refine_job"):
+    for user in ("free_camera_picture", "highlight_edges"):
         monkeypatch.setattr(f"relume.live.free_camera.{user}.render_frame", darkened)
-    monkeypatch.setattr("relume.live.free_camera.refinement.refinement_jobs.SAMPLE_SPACING", 4)
+    monkeypatch.setattr("relume.live.free_camera.static_view_jobs.SAMPLE_SPACING", 4)
     picture.set_camera(moved_camera, (160, 100))
     picture.advance(None)
     before, job = picture.image().copy(), picture.next_job()
-    assert isinstance(job, SparseExactJob)
-    picture.install(job, job.run(lambda share: None, lambda: False))
+    assert kind_of(job) == "exact samples"
+    job.apply(job.run(lambda share: None, lambda: False))
     return picture, before
 
 
@@ -203,7 +203,7 @@ def test_sparse_exact_samples_correct_the_free_camera_picture(sparse_samples):
     assert (step.exact, step.fidelity, step.previous_error, step.changed) == (False, "approximate", None, True)
     assert picture.array_blocks() is None  # client-side shaders have no correction
     first = picture.image().copy()
-    assert isinstance(picture.next_job(), StaticViewJob)
+    assert kind_of(picture.next_job()) == "static view"
     step = finish_jobs(picture)
     assert step.exact
     assert step.previous_error == pytest.approx(relative_rmse(before, picture.image()), rel=1e-3)
@@ -212,7 +212,7 @@ def test_sparse_exact_samples_correct_the_free_camera_picture(sparse_samples):
 
 
 def test_sparse_samples_do_not_change_a_correct_picture(picture, moved_camera, monkeypatch):
-    monkeypatch.setattr("relume.live.free_camera.refinement.refinement_jobs.SAMPLE_SPACING", 4)
+    monkeypatch.setattr("relume.live.free_camera.static_view_jobs.SAMPLE_SPACING", 4)
     picture.set_camera(moved_camera, (160, 100))
     picture.advance(None)
     before = picture.image().copy()
@@ -239,7 +239,7 @@ def test_sparse_correction_is_valid_for_one_look_and_camera(sparse_samples, free
     assert picture.advance(None).changed
     alone.advance(None)
     np.testing.assert_array_equal(picture.image(), alone.image())
-    assert isinstance(picture.next_job(), SparseExactJob)
+    assert kind_of(picture.next_job()) == "exact samples"
 
 
 @pytest.fixture
@@ -281,7 +281,7 @@ def test_indirect_light_is_added_to_a_static_view_begun_without_it(free_bake, pi
     job = picture.next_job()
     made = job.run(lambda share: None, lambda: False)
     picture.set_look(whole)
-    picture.install(job, made)
+    job.apply(made)
     assert picture.advance(None).fidelity == "approximate"
     assert finish_jobs(picture).exact
     assert traced_stages == sorted(traced_stages)

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from fastapi.testclient import TestClient
 from prometheus_client.registry import CollectorRegistry
-from server_fakes import Control, InThreadBatches
+from server_fakes import Control, InThreadSteps
 from server_fixtures import open_fake_bakes
 
 from relume_server.app import create_app
@@ -30,7 +30,7 @@ def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegi
     """The metrics of a running server."""
     settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], preload_importer=False)
     library = Control().open_library
-    app = create_app(settings, open_library=library, open_batches=InThreadBatches, open_bakes=open_fake_bakes)
+    app = create_app(settings, open_library=library, open_steps=InThreadSteps, open_bakes=open_fake_bakes)
     with TestClient(app):
         yield app.state.services.metrics.registry
 

@@ -96,7 +96,7 @@ def test_old_revision_is_refused(client: TestClient, baked: Baked, revision: int
         session.edit(revision, SIGMA, 0.1)
         problem = session.text("problem")
         assert problem["revision"] == revision
-        assert "old revision" in problem["problem"]["detail"]
+        assert "is not newer than" in problem["problem"]["detail"]
         assert is_alive(session, 6)
 
 
@@ -259,7 +259,7 @@ def test_a_silent_client_is_closed(client: TestClient, baked: Baked, monkeypatch
     opened = client.websocket_connect(session_path(baked.bake, {}), ["relume.v2"])
     with opened as websocket, pytest.raises(ConnectionError) as closed:
         Session(websocket, acknowledges=False).receive()
-    assert closed.value.args == (1008, "no message within 0.05 s; send open first")
+    assert closed.value.args == (1008, "no message arrived within 0.05 s; send open first")
 
 
 def test_a_session_is_opened_once(client: TestClient, baked: Baked) -> None:

@@ -188,7 +188,7 @@ def test_an_old_config_logs_the_matching_space(tmp_path, caplog):
         assert (config.working, config.displays, config.spaces) == ("lin", {"Monitor": ("Film", "Broken")}, ("lin",))
         gray = np.full((1, 1, 3), 0.25, np.float32)
         np.testing.assert_allclose(tone_map(gray, 0.0, OcioView("Monitor", "Film")), 0.5, atol=1e-5)
-        with pytest.raises(ParameterError, match="log says which"):
+        with pytest.raises(ParameterError, match="log names it"):
             config.table(OcioView("Monitor", "Broken"))
         assert str(Path("gone.cube")) in caplog.text
         for view in (OcioView("Monitor", "film"), OcioView("Film", "Film")):

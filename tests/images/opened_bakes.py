@@ -5,9 +5,10 @@ from session_edits import run_until_exact
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.methods.registry import METHODS, open_bake
-from relume.store import bake_in_process
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 
 def open_small_bake(scene, method, folder):

@@ -12,7 +12,7 @@ from tiny_scenes import make_tiny_scene, mesh
 from relume.core.errors import ParameterError
 from relume.images.image_store import load_texture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.probes.texture_overrides import ProbeMapOverrides, overridden_textures
+from relume.live.free_camera.texture_overrides import ProbeMapOverrides, overridden_textures
 from relume.look import default_look, validate
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.scene_buffers import build_scene_buffers

@@ -16,10 +16,10 @@ from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ParameterError, StoreError
 from relume.images.image_store import load_normal_map, store
 from relume.live.fixed_camera.picture import Picture
-from relume.live.free_camera.probes.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.live.free_camera.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.live.opened.retrace import NormalRetracer
 from relume.look import default_look, validate
 from relume.methods.gather import RAYS_PER_SAMPLE
-from relume.methods.retrace import NormalRetracer
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
 from relume.reference.textures import with_overrides
@@ -93,7 +93,7 @@ def normal_mapped(scene, name, scale=SCALE, **others):
 
 def test_pictures_equal_those_of_a_scene_with_the_normal_map(bakes, plain, named):
     """Also in a rotated environment. Triangles of the coarse ball have one tangent each, vertices an interpolated one;
-    patch points see other photons.
+    patch points see other importons.
     """
     bare, baked = bakes
     max_error, usual = (0.015, 1e-6) if bare.method == "direct" else (0.015, 0.003)

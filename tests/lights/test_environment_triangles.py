@@ -11,7 +11,7 @@ from relume.core.color import luminance
 from relume.core.errors import PlanError
 from relume.lights.light_moments import F64, LightTexels, compute_moments
 from relume.lights.sphere_tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
-from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment, tessellate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment, tessellate_environment
 
 
 def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
@@ -249,8 +249,8 @@ def test_invalid_counts_are_rejected(requested):
 def test_a_rotated_environment_equals_its_rotated_image(columns):
     radiance = studio()  # 64 texels wide
     tiles = choose_tiles(radiance, 200)
-    rotated = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance), 360 * columns / 64)
-    rolled = integrate_environment(tiles, RotatedEnvironment.from_radiance(np.roll(radiance, -columns, axis=1)))
+    rotated = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance), 360 * columns / 64)
+    rolled = integrate_environment(tiles, EnvironmentTexels.from_radiance(np.roll(radiance, -columns, axis=1)))
     # a texel center that rounding moves across an edge changes two tiles; most tiles have none there
     same = np.isclose(rotated.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
     assert same.mean() > 0.9
@@ -263,7 +263,7 @@ def test_a_rotated_environment_equals_its_rotated_image(columns):
 def test_another_environment_keeps_its_light_in_the_same_tiles():
     tiles = choose_tiles(studio(), 300)
     other = np.random.default_rng(4).random((38, 76, 3), np.float32)
-    lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(other))
+    lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(other))
     np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), texel_power(other).sum(axis=0), rtol=1e-6)
     depth = np.diagonal(depth_inside(tiles.corners, lights.direction.astype(float)))
     assert (depth > -1e-6).all()
@@ -319,7 +319,7 @@ def test_a_downsampled_map_has_the_same_power():
     assert halve_to_width(small[:, :-1], 4).shape == small[:, :-1].shape  # an odd side cannot be halved
     tiles = choose_tiles(studio(), 60)
     few, all_texels = (
-        integrate_environment(tiles, RotatedEnvironment.from_radiance(texels)).irradiance.sum(0)
+        integrate_environment(tiles, EnvironmentTexels.from_radiance(texels)).irradiance.sum(0)
         for texels in (small, whole)
     )
     np.testing.assert_allclose(few, all_texels, rtol=1e-2)

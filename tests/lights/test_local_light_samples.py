@@ -9,7 +9,7 @@ from tiny_scenes import make_emissive_triangles, make_surface_points
 from relume.lights.local_lights import light_sample, make_light_strata, prepare_local_lights, rectangle
 from relume.look import LightGeometry
 from relume.raytrace.gather_rays import cranley_patterson_offset
-from relume.raytrace.light_visibility import compute_irradiance
+from relume.raytrace.local_light_visibility import compute_irradiance
 
 RNG = np.random.default_rng(11)
 PIECES = RNG.normal(size=(5, 3, 3))

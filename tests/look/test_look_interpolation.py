@@ -43,6 +43,25 @@ def test_logarithmic_parameters_are_interpolated_logarithmically():
     assert ball(interpolate_looks([look(), last], 0.5))[1]["params"]["exponent"] == pytest.approx([100.0, 10.0, 20.0])
 
 
+@pytest.mark.parametrize("fraction", [0.1, 0.3, 0.5, 0.7])
+def test_interpolated_parameters_stay_within_their_range(fraction):
+    """Rounding of the logarithm must not exceed the end of a slider."""
+    keys = [copy.deepcopy(look()), copy.deepcopy(look())]
+    for key, blue in zip(keys, (20.0, 30.0), strict=True):
+        ball(key)[1]["params"]["exponent"] = [2e5, 2e5, blue]
+    between = interpolate_looks(keys, fraction)
+    assert ball(between)[1]["params"]["exponent"][:2] == [2e5, 2e5]
+    assert complete(between, DEFAULT) == between
+
+
+def test_a_light_between_opposite_directions_has_a_direction():
+    spot = {"kind": "spot", "direction": [0.0, -1.0, 0.0]}
+    keys = [look(lights={"Lamp": spot}), look(lights={"Lamp": {**spot, "direction": [0.0, 1.0, 0.0]}})]
+    between = interpolate_looks(keys, 0.5)
+    assert between["lights"]["Lamp"]["direction"] == [0.0, 1.0, 0.0]
+    assert complete(between, DEFAULT) == between
+
+
 def test_discrete_values_switch_halfway_and_stay_valid():
     last = copy.deepcopy(look())
     ball(last)[1] = {"model": "phong", "color": [1.0, 1.0, 1.0], "params": {"exponent": 20.0}}

@@ -47,6 +47,7 @@ from relume.scene.model import Light, Material
         (f"{CURVES}/theta_h", {"points": make_flat_curve(20_000)}, f"{CURVES}/theta_h/points", "2 to 4096"),
         (f"{CURVES}/theta_h", {"points": [[0, 1]]}, f"{CURVES}/theta_h/points", "2 to 4096"),
         (f"{CURVES}/theta_h", {"points": [[0, 1], [0, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
+        (f"{CURVES}/theta_h", {"points": [[0, 1], [1e-300, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
         (f"{CURVES}/theta_h", {"points": [[3, 1], [2, 2]]}, f"{CURVES}/theta_h/points/1/0", "greater"),
         (f"{CURVES}/theta_h", {"points": [[0, 1], [91, 2]]}, f"{CURVES}/theta_h/points/1/0", "[0, 90]"),
         (f"{CURVES}/theta_h", {"points": [[0, 1], [NAN, 2], [80, 1]]}, f"{CURVES}/theta_h/points/1/0", "[0, 90]"),

@@ -7,7 +7,7 @@ from hemisphere_quadrature import hemisphere
 from numpy.typing import NDArray
 
 from relume.lights.spherical_triangles import TriangleLights
-from relume.math.zernike import DEGREE, NUM_FUNCTIONS, num_functions, project, recurrence
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, basis_functions, num_functions, recurrence
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import any_tangent
 from relume.transport.incident_coefficients import F64, incident_coefficients
@@ -26,7 +26,7 @@ def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8
     wi = np.einsum("nij,mj->nmi", frame, lights.direction.astype(np.float64))
     is_visible = np.unpackbits(visible, axis=1, count=lights.num_lights, bitorder="little").astype(np.float64)
     weight = is_visible * np.maximum(wi[..., 2], 0)
-    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), project(wi)))
+    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), basis_functions(wi)))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -55,14 +55,14 @@ def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
 def test_functions_are_orthonormal_under_the_cosine():
     wi, weight = hemisphere()
     assert weight.sum() == pytest.approx(np.pi)  # of a white environment
-    functions = project(wi)
+    functions = basis_functions(wi)
     np.testing.assert_allclose(np.einsum("nk,nl,n->kl", functions, functions, weight), np.eye(NUM_FUNCTIONS), atol=1e-6)
 
 
 def test_functions_are_sorted_by_polynomial_degree():
     """A prefix of the functions is the basis of a lower degree: x^a y^b lies in it if a + b is at most that degree."""
     wi, weight = hemisphere()
-    functions = project(wi)
+    functions = basis_functions(wi)
     for degree in range(DEGREE + 1):
         monomial = wi[:, 0] ** degree
         fraction = np.einsum("n,nk,n->k", monomial, functions, weight)
@@ -71,7 +71,7 @@ def test_functions_are_sorted_by_polynomial_degree():
 
 
 def test_light_below_the_horizon_contributes_nothing():
-    assert not project(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
+    assert not basis_functions(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
 
 
 def test_every_function_has_one_table_entry():
@@ -118,7 +118,7 @@ def test_functions_in_one_direction_equal_all_functions():
     def along(table, x, y, out):
         evaluate_basis_along(table, x, y, out)
 
-    for direction, expected in zip(wi, project(wi), strict=True):
+    for direction, expected in zip(wi, basis_functions(wi), strict=True):
         out = np.full(NUM_FUNCTIONS, np.nan, np.float32)
         along(recurrence(), np.float32(direction[0]), np.float32(direction[1]), out)
         np.testing.assert_allclose(out, expected, atol=1e-5)

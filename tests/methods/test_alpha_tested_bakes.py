@@ -11,15 +11,16 @@ from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad,
 from relume.core.cache import Cache
 from relume.lights.local_lights import make_light_strata, prepare_local_lights
 from relume.live.free_camera.browser.geometry_arrays import constants
+from relume.live.opened.openers import open_bake
 from relume.look import LightGeometry
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
-from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.local_light_visibility import trace_light_visibility
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
 from relume.scene.model import Material, Opacity
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 __all__ = ["unmeasured"]  # a fixture
 

@@ -20,9 +20,9 @@ from relume.methods.disk import SMALL_BYTES, estimate_disk
 from relume.methods.registry import METHODS
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Glass, Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
-from relume.store.room import scratch_file
+from relume.store.disk_space import scratch_file
+from relume.store.run_bake import bake_in_process
 from relume.store.writer import create_store
 from relume_worker.budget import check_budget
 

@@ -7,11 +7,12 @@ from tiny_scenes import make_tiny_scene
 from relume import look as looks
 from relume.core.cache import Cache
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.methods.registry import METHODS, open_bake
-from relume.methods.static_view import StaticViewBuilder
+from relume.live.opened.openers import open_bake
+from relume.live.opened.static_view import StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (80, 60)
 

@@ -11,11 +11,11 @@ import numpy_reference as ref
 import pytest
 from analytic_terms import ANALYTIC
 from exact_pictures import render_uncached
-from session_edits import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, bake_corner_scene, kind_of, make_look, relative_rmse, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.assets.environments.equirect import texel_directions
-from relume.brdf.albedo import pack_reflectance, reflectance, unpack_reflectance
+from relume.brdf.albedo import material_reflectance, reflectance
 from relume.brdf.curves import curve_bands
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
@@ -23,10 +23,9 @@ from relume.core.cache import Cache
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.opened.openers import open_transfer
 from relume.look import LightPaths, validate
 from relume.math.zernike import OUTGOING_DEGREE
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.patches.patches import patch_sample_points
@@ -48,15 +47,15 @@ NUM_PATCHES = 90
 CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
 PLAIN = {"texture": None, "params": {}, "curves": {}}
 REFLECTANCES = (
-    pack_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}]),
-    pack_reflectance(
+    material_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}]),
+    material_reflectance(
         [
             {**PLAIN, "model": "lambert", "color": [0.6, 0.2, 0.4], "texture": "diffuse"},
             {**PLAIN, "model": "blinn_phong", "color": [0.1, 0.1, 0.2], "params": {"exponent": 30.0}},
         ]
     ),
 )
-BLACK = pack_reflectance([])
+BLACK = material_reflectance([])
 
 
 @pytest.fixture(scope="module")
@@ -215,7 +214,7 @@ def test_first_and_further_bounces_sum_to_all(patches, lights):
 
 def test_reflectance_uses_the_texture_of_each_term(patches):
     reflectance_map = patches.reflectance_operator(REFLECTANCES)
-    unpacked = [unpack_reflectance(of_material)[..., 0] for of_material in REFLECTANCES]
+    unpacked = [of_material.matrix[..., 0] for of_material in REFLECTANCES]
     expected = np.where(
         patches.material[:, None] == 0, unpacked[0][0], unpacked[1][0] + unpacked[1][1] * patches.textures[0]
     )
@@ -237,7 +236,7 @@ def test_reflectance_of_highlights():
         blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
         np.testing.assert_allclose(reflectance(blinn), _by_sampling(blinn), rtol=0.02)
     lambert = {**plain, "model": "lambert", "params": {}}
-    combined = unpack_reflectance(pack_reflectance([lambert, {**blinn, "texture": "specular"}]))[..., 0]
+    combined = material_reflectance([lambert, {**blinn, "texture": "specular"}]).matrix[..., 0]
     np.testing.assert_allclose(combined[0], [1.0, 0.5, 0.0], rtol=1e-6)
     np.testing.assert_allclose(combined[2], reflectance(blinn), atol=0.5 / 128)
 
@@ -409,8 +408,8 @@ def test_the_displayed_paths_can_change_in_a_session(gathered, monkeypatch):
         if show == "all":
             picture.advance(None)
             need = picture.next_job()
-            assert isinstance(need, SparsePreview)
-            picture.install(need, need.run(lambda fraction: None, lambda: False))
+            assert kind_of(need) == "preview"
+            need.apply(need.run(lambda fraction: None, lambda: False))
             picture.advance(None)
             preview = picture.image()
             exact = run_until_exact(picture).image()
@@ -441,8 +440,8 @@ def test_a_rotation_is_previewed_with_its_indirect_light(gathered, monkeypatch):
     picture.set_look(make_look(gathered, turn))
     picture.advance(None)
     still, need = picture.image(), picture.next_job()
-    assert isinstance(need, SparsePreview)
-    picture.install(need, need.run(lambda fraction: None, lambda: False))
+    assert kind_of(need) == "preview"
+    need.apply(need.run(lambda fraction: None, lambda: False))
     assert not picture.advance(None).exact
     preview, exact = picture.image(), run_until_exact(picture).image()
     assert relative_rmse(preview, exact) < 0.7 * relative_rmse(still, exact)

@@ -12,11 +12,13 @@ from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.core.cache import Cache
 from relume.core.errors import PlanError
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import Recipe
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_worker.status import recipe_from_json, recipe_json
 
 __all__ = ["unmeasured"]  # a fixture

@@ -8,12 +8,13 @@ from tiny_scenes import make_camera, make_tiny_scene, mesh, sphere
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 WHITE = {"model": "lambert", "color": [0.8, 0.8, 0.8]}
 FRONT = make_camera("front", (0, 0, 4), (0, 0, 0), 1.0)

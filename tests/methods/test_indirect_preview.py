@@ -9,8 +9,8 @@ from session_edits import BUDGET, make_look, relative_rmse
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.protocols import LightQuality
-from relume.methods.opened import fixed_views as transfers
-from relume.methods.registry import open_transfer
+from relume.live.opened import fixed_views as transfers
+from relume.live.opened.openers import open_transfer
 from relume.radiosity.solve_bounces import solve_bounces
 
 

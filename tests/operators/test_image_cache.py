@@ -12,9 +12,9 @@ from picture_edits import open_exact_picture, set_sigma
 from session_edits import BUDGET, make_look
 
 from relume.core.cache import Cache
-from relume.live.fixed_camera.jobs import Shade
-from relume.methods.opened import fixed_views as transfer_module
-from relume.methods.registry import open_transfer
+from relume.live.fixed_camera.strategies.shading import Shading
+from relume.live.opened import fixed_views as transfer_module
+from relume.live.opened.openers import open_transfer
 from relume.operators.image_cache import ImageFiles
 from relume.operators.shade import ShadedTerm
 
@@ -69,13 +69,13 @@ def test_images_of_other_code_are_ignored_and_deleted_with_the_first_write(tmp_p
 
 def test_after_an_upgrade_images_are_computed_again(baked, tmp_path, monkeypatch):
     store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns(*DERIVED_FOLDERS))
-    made, finished = [], Shade._complete_image
+    made, finished = [], Shading._complete_image
 
     def counted(*args):
         made.append(1)
         return finished(*args)
 
-    monkeypatch.setattr(Shade, "_complete_image", counted)
+    monkeypatch.setattr(Shading, "_complete_image", counted)
     open_exact_picture(open_transfer(store, Cache(BUDGET)))
     num_images = len(made)
     assert num_images > 0
@@ -89,7 +89,7 @@ def test_after_an_upgrade_images_are_computed_again(baked, tmp_path, monkeypatch
 def test_the_image_of_an_edited_look_survives_a_restart(transfer, monkeypatch):
     look = make_look(transfer, set_sigma(0.23456))
     before = open_exact_picture(transfer, look=look).image()
-    monkeypatch.setattr(Shade, "_complete_image", lambda *args: refuse())
+    monkeypatch.setattr(Shading, "_complete_image", lambda *args: refuse())
     np.testing.assert_array_equal(open_exact_picture(transfer, look=look).image(), before)
     with pytest.raises(AssertionError, match="made again"):
         open_exact_picture(transfer, look=make_look(transfer, set_sigma(0.23457)))

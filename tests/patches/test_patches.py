@@ -9,9 +9,9 @@ import pytest
 from tiny_scenes import corner, make_camera, make_surface_points, make_tiny_scene, sphere
 
 from relume.patches.gather_hits import trace_gather_rays
+from relume.patches.importons import lobe_directions
 from relume.patches.patch_kdtree import NO_PATCH, grow_tree, locate
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches, patch_sample_points
-from relume.patches.photon_density import lobe_directions
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern
 from relume.raytrace.ray_packet import LANES

@@ -5,7 +5,7 @@ import numpy_reference as ref
 import pytest
 from session_edits import relative_rmse
 
-from relume.brdf.albedo import pack_reflectance
+from relume.brdf.albedo import material_reflectance
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.math.zernike import OUTGOING_DEGREE
 from relume.patches.patch_kdtree import NO_PATCH
@@ -19,8 +19,10 @@ from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, bin_o
 
 NUM_PATCHES = 60
 PLAIN = {"texture": None, "params": {}, "curves": {}}
-DIFFUSE = pack_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}])
-SHINY = pack_reflectance([{**PLAIN, "model": "blinn_phong", "color": [0.4, 0.3, 0.5], "params": {"exponent": 20.0}}])
+DIFFUSE = material_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}])
+SHINY = material_reflectance(
+    [{**PLAIN, "model": "blinn_phong", "color": [0.4, 0.3, 0.5], "params": {"exponent": 20.0}}]
+)
 
 
 @pytest.fixture(scope="module")

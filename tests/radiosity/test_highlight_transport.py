@@ -1,13 +1,12 @@
 """Direct light on patches with narrow highlights, by tables, against the BRDF itself."""
 
-import json
-
 import numpy as np
 import numpy_reference as ref
 import pytest
 
-from relume.brdf.albedo import narrow_lobes, pack_reflectance, reflectance_matrix, unpack_lobes
+from relume.brdf.albedo import material_reflectance, narrow_lobes, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.highlight_tables import lobe_table
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.math.direction_grid import (
@@ -74,7 +73,7 @@ def mean_over_bins(document, wi):
 
 @pytest.mark.parametrize("roughness", [0.3, 0.5])
 def test_tables_are_means_over_bins(roughness):
-    table, document, area = lobe_table(json.dumps(metal(roughness))), metal(roughness), bin_solid_angles()
+    table, document, area = lobe_table(FrozenTerm.from_document(metal(roughness))), metal(roughness), bin_solid_angles()
     for b in (0, 60, 200):
         exact = mean_over_bins(document, fine_bin_centers()[b])
         missed = np.sqrt(np.sum(area * (table[b] - exact) ** 2) / np.sum(area * exact**2))
@@ -84,7 +83,7 @@ def test_tables_are_means_over_bins(roughness):
 @pytest.mark.parametrize("roughness", [0.03, 0.1])
 def test_tables_of_lobes_narrower_than_bins_preserve_energy(roughness):
     """A mirror at normal incidence reflects 0.9, wherever the lobe lies in a bin."""
-    outgoing = lobe_table(json.dumps(metal(roughness)))[:60] @ bin_solid_angles()
+    outgoing = lobe_table(FrozenTerm.from_document(metal(roughness)))[:60] @ bin_solid_angles()
     np.testing.assert_allclose(outgoing, 0.9, rtol=0.02)
 
 
@@ -119,11 +118,11 @@ def expected(patches, lights, documents, patch):
 @pytest.mark.parametrize("spread", [0.0, 0.1])
 def test_patches_reflect_lights_with_their_highlights(lights, spread):
     patches, documents = patches_with_normals(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
-    reflectances = (pack_reflectance([DIFFUSE, *documents]),)
+    reflectances = (material_reflectance([DIFFUSE, *documents]),)
     lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
     actual = outgoing_in_highlights(patches, lobes, DirectLobes(lights, patches.visibility_bits(lobes.rows)))
     area = bin_solid_angles()
-    exact = expected(patches, lights, unpack_lobes(reflectances[0]), 3)
+    exact = expected(patches, lights, reflectances[0].lobes, 3)
     assert np.sqrt(np.sum(area * (actual[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
     np.testing.assert_allclose(actual[3] @ area, exact @ area, rtol=0.04)
 
@@ -144,10 +143,10 @@ class _OneRay:
 
 
 def test_rays_of_local_lights_are_reflected_like_lights():
-    patches, reflectances = patches_with_normals(flat()), (pack_reflectance([metal(0.3)]),)
+    patches, reflectances = patches_with_normals(flat()), (material_reflectance([metal(0.3)]),)
     lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
     actual = outgoing_in_highlights(patches, lobes, DirectLobes(rays=[_OneRay()]))
-    exact = mean_over_bins(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
+    exact = mean_over_bins(reflectances[0].lobes[0], _LOCAL) * [[1], [2], [3]]
     for patch in range(NUM_PATCHES):
         assert np.linalg.norm(actual[patch] - exact) < 0.03 * np.linalg.norm(exact)
 
@@ -155,7 +154,7 @@ def test_rays_of_local_lights_are_reflected_like_lights():
 def test_highlights_are_not_counted_twice(lights):
     """With a table, basis functions and the isotropic part represent only diffuse terms."""
     patches = patches_with_normals(flat())
-    glossy, diffuse = ((pack_reflectance(terms),) for terms in ([DIFFUSE, metal(0.3)], [DIFFUSE]))
+    glossy, diffuse = ((material_reflectance(terms),) for terms in ([DIFFUSE, metal(0.3)], [DIFFUSE]))
     reflecting, plain = patches.reflectance_operator(glossy), patches.reflectance_operator(diffuse)
     rows = reflecting.rows
     incident = IncidentLight(patches.irradiance(lights), patches.incident_coefficients(rows, lights, 6))
@@ -171,16 +170,16 @@ def test_only_highlights_beyond_the_basis_have_tables():
     assert narrow_lobes([{**metal(0.2), "params": {"roughness": 0.2, "f0": 0.0}, "color": [0.1, 0.1, 0.1]}]) == []
     assert len(narrow_lobes([metal(0.2), metal(0.8)])) == 2  # all terms of a material or none
     patches = patches_with_normals(flat())
-    reflectances = (pack_reflectance([metal(0.8)]),)
+    reflectances = (material_reflectance([metal(0.8)]),)
     lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
     assert len(lobes.rows) == 0
     assert outgoing_in_highlights(patches, lobes, DirectLobes()).shape == (0, 3, SIDE * SIDE)
 
 
 def test_small_edits_do_not_change_the_light():
-    assert pack_reflectance([metal(0.3)]) == pack_reflectance([metal(0.3001)])
-    assert pack_reflectance([metal(0.3)]) != pack_reflectance([metal(0.31)])
-    before, after = unpack_lobes(pack_reflectance([metal(0.3)])), unpack_lobes(pack_reflectance([metal(0.31)]))
+    assert material_reflectance([metal(0.3)]) == material_reflectance([metal(0.3001)])
+    assert material_reflectance([metal(0.3)]) != material_reflectance([metal(0.31)])
+    before, after = material_reflectance([metal(0.3)]).lobes, material_reflectance([metal(0.31)]).lobes
     assert abs(before[0]["params"]["roughness"] - 0.3) < 0.003
     assert abs(after[0]["params"]["roughness"] - 0.31) < 0.003
     assert abs(reflectance_matrix(before[0])[0, 0] - reflectance_matrix(metal(0.3))[0, 0]) < 0.01

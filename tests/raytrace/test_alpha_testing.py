@@ -16,7 +16,7 @@ from relume.look import LightGeometry
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE, STOP_AT_PARTIAL
 from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks, collect_alpha_masks
 from relume.raytrace.camera_rays import trace_rays
-from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.local_light_visibility import trace_light_visibility
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.visibility import trace_visibility
 from relume.scene.model import Glass, Material, Opacity

@@ -11,7 +11,7 @@ from relume.lights.local_lights import light_sample, make_light_strata, prepare_
 from relume.look import LightGeometry
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import cranley_patterson_offset
-from relume.raytrace.light_visibility import MIN_GROUPED_SAMPLES, compute_irradiance, trace_light_visibility
+from relume.raytrace.local_light_visibility import MIN_GROUPED_SAMPLES, compute_irradiance, trace_light_visibility
 from relume.raytrace.scene_buffers import build_scene_buffers
 
 UP = np.array([0, 1, 0], np.float32)

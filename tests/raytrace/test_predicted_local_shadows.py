@@ -10,7 +10,7 @@ from relume.camera.view_samples import BACKGROUND, sample_view
 from relume.lights.local_lights import make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.light_visibility import compute_irradiance, trace_light_visibility
+from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
 from relume.raytrace.moving_light import BLOCK, trace_moving_light
 from relume.raytrace.scene_buffers import build_scene_buffers
 

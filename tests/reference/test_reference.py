@@ -14,9 +14,9 @@ from relume.brdf.evaluate import eval_brdf
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, PlanError
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import default_look, validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference import (
@@ -29,8 +29,8 @@ from relume.reference import (
 )
 from relume.scene.model import Light, Material, Scene
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 WHITE = {"model": "lambert", "color": [1.0, 1.0, 1.0], "params": {}, "curves": {}, "texture": None}
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
-from server_fakes import SIZE, Control, InThreadBatches, tiny_scene
+from server_fakes import SIZE, Control, InThreadSteps, tiny_scene
 from server_fixtures import open_fake_bakes
 from websockets import Subprotocol
 from websockets.sync.client import ClientConnection, connect
@@ -52,9 +52,7 @@ def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
 @contextmanager
 def running_server(settings: Settings, control: Control) -> Iterator[Running]:
     settings.allowed_hosts = ["127.0.0.1"]
-    app = create_app(
-        settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
-    )
+    app = create_app(settings, open_library=control.open_library, open_steps=InThreadSteps, open_bakes=open_fake_bakes)
     process = create_server(app, settings)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=process.run, kwargs={"sockets": [listening]})

@@ -5,27 +5,29 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from relume.assets.environments.environment import Environment
 from relume.core.cache import CacheOwner
 from relume.core.errors import CancelledError, EditNotSupportedError, MemoryBudgetError
+from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.jobs import Job, Priority, ignore_result
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis
 from relume.look import default_look
 from relume.output.viewport import Viewport
 from relume.reference import ReferenceImage
 from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.scene.scene_folder import load_scene, make_scene
-from relume.store import open_store
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
+from relume.store.reader import open_store
 from relume_server.batch.context import BatchContext
-from relume_server.batch.step import IsNeeded, ProgressCallback, Step
 from relume_server.batch.step_registry import do_step
 from relume_server.io.import_request import ImportRequest, _write_scene
 from relume_server.runtime.protocols import Library
 from relume_server.settings import Settings
+from relume_worker.jobs.step import IsNeeded, ProgressCallback, Step
 
 THETA_H, THETA_D = (f"/materials/Paper/terms/1/curves/{name}" for name in ("theta_h", "theta_d"))
 TILE = 64
@@ -116,33 +118,31 @@ class FakeTransfer:
         return np.ones((4, 8, 3), np.float32)
 
 
-@dataclass(frozen=True)
-class FakeJob:
-    """One curve; the job waits for `control.freeze_gate`."""
+def fake_job(
+    control: "Control",
+    key: str,
+    *,
+    state: Literal["precomputing", "shading"] = "precomputing",
+    priority: Priority = Priority.CONTROL,
+    apply: Callable[[str], None] = ignore_result,
+) -> Job:
+    """The job of one curve; it waits for `control.freeze_gate`."""
 
-    control: "Control"
-    key: str
-    state: str = "precomputing"
-    is_refinement: bool = False
-    is_resumable: bool = False
-
-    @property
-    def label(self) -> str:
-        return f"Paper, {self.key.rsplit('/', 1)[-1]}"
-
-    def run(self, progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> str:
-        self.control.freeze_started.set()
+    def run(progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> str:
+        control.freeze_started.set()
         progress(0.5)
-        while not self.control.freeze_gate.wait(0.01):
+        while not control.freeze_gate.wait(0.01):
             if is_canceled():
-                self.control.num_cancelled += 1
+                control.num_cancelled += 1
                 raise CancelledError("stopped")
-        return self.key
+        return key
+
+    return Job(("curve", key), f"Paper, {key.rsplit('/', 1)[-1]}", priority, run, apply, state)
 
 
 def make_advance(tiles: list[Any], exact: bool) -> SimpleNamespace:
     """The result of a step of a whole picture."""
-    fidelity = "exact" if exact else "approximate"
+    fidelity = Fidelity.EXACT if exact else Fidelity.APPROXIMATE
     fields = {"exact": exact, "fidelity": fidelity, "complete": True, "previous_error": None}
     return SimpleNamespace(tiles=tiles, changed=bool(tiles), **fields)
 
@@ -185,17 +185,13 @@ class FakePicture:
             raise MemoryBudgetError("the curve", 2, 1, "close it")
         self.active_pointer = pointer
 
-    def next_job(self) -> FakeJob | None:
+    def next_job(self) -> Job | None:
         missing_curves = [THETA_D] if self._needs_theta_d() else []
         pending_curves = [curve for curve in (*missing_curves, self.active_pointer) if curve not in self.frozen_curves]
-        return (
-            FakeJob(self.control, pending_curves[0], is_refinement=self.control.is_refinement)
-            if pending_curves
-            else None
-        )
-
-    def install(self, job: FakeJob, result: str) -> None:
-        self.frozen_curves.add(result)
+        if not pending_curves:
+            return None
+        priority = Priority.REFINEMENT if self.control.is_refinement else Priority.CONTROL
+        return fake_job(self.control, pending_curves[0], priority=priority, apply=self.frozen_curves.add)
 
     def _needs_theta_d(self) -> bool:
         return self.look is not None and get_ior(self.look) != self.ior
@@ -358,20 +354,17 @@ class Control:
         return ReferenceImage(all_paths if is_whole else None, supported, ("What surfaces reflect.",), ())
 
 
-class InThreadBatches:
+class InThreadSteps:
     """Run steps in the calling thread with the server's library."""
 
-    def __init__(self, settings: Settings, library: Library) -> None:
-        self._context = BatchContext(settings.data, library)
+    def __init__(self, settings: Settings, library: Library, bakes: object = None) -> None:
+        self._context = BatchContext(settings.data, library, (settings.import_bytes, settings.import_seconds))
 
     def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         return do_step(self._context, step, report, lambda: not is_needed())
 
-    def resident_bytes(self) -> int:
-        return 0
-
-    def release(self) -> None:
-        pass
+    def num_places(self) -> int:
+        return 1
 
     def close(self) -> None:
         pass

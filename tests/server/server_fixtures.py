@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fakes import SIZE, Control, FakeMethod, InThreadBatches, tiny_scene
+from server_fakes import SIZE, Control, FakeMethod, InThreadSteps, tiny_scene
 from session_client import Baked
 from sqlalchemy import Engine, event
 
@@ -95,9 +95,7 @@ def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is not a slow link
     # and it does not take more steps
     monkeypatch.setattr("relume_server.session.frames.coefficient_budget.MIN_COEFFICIENTS", 512)
-    app = create_app(
-        settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
-    )
+    app = create_app(settings, open_library=control.open_library, open_steps=InThreadSteps, open_bakes=open_fake_bakes)
     with no_database_on_the_loop(), TestClient(app, raise_server_exceptions=False) as client:
         yield client
 

@@ -196,7 +196,7 @@ def test_jobs_take_turns_and_images_do_not_wait_for_geometry(
     url = client.post(f"{WORKS}/synthetic", json={"geometry": "weave"}).headers["location"]
     assert wait_for(client, url, "ready", "failed")["state"] == "ready"
     assert len(done) == 7
-    assert client.get(images[0]).json()["state"] == "ready"
+    assert wait_for(client, images[0], "ready", "failed")["state"] == "ready"
 
 
 def test_oversized_uploads_and_forms_are_rejected(client: TestClient, settings: Settings) -> None:

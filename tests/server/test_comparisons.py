@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
-from server_fakes import SIZE, Control, FakeTransfer, InThreadBatches
+from server_fakes import SIZE, Control, FakeTransfer, InThreadSteps
 from session_client import Baked
 
 from relume.core.errors import CancelledError
@@ -19,6 +19,7 @@ from relume_server.app import create_app
 from relume_server.batch.step_registry import STEPS
 from relume_server.jobs.comparison_jobs import DEFAULT_PIXEL_S
 from relume_server.settings import Settings
+from relume_worker.database.models import JobRow
 
 WAIT_S = 60.0
 
@@ -96,17 +97,17 @@ def test_comparison_resumes_after_a_restart_and_restarts_after_an_upgrade(
     control.trace_gate.set()
     url = submit(client, baked, 3)
     assert wait_until(client, url, is_done)["state"] == "ready"
-    queue = client.app.state.services.comparisons
+    comparisons = client.app.state.services.comparisons
     identity = url.rsplit("/", 1)[1]
-    request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
-    queue.close()  # otherwise it might take the job first
+    request = comparisons.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
+    comparisons._service.close()  # otherwise it might take the job first
     # the state after a kill in the fourth pass
-    queue._update(identity, ("ready",), state="running", request=request)
+    comparisons._service.ledger._update(JobRow.id == identity, state="running", request=request)
     if is_upgraded:
         monkeypatch.setattr("relume_server.batch.reference_passes.comparison_code", lambda: "0123456789abcdef")
     later = Control()
     later.trace_gate.set()
-    with TestClient(create_app(settings, open_library=later.open_library, open_batches=InThreadBatches)) as restarted:
+    with TestClient(create_app(settings, open_library=later.open_library, open_steps=InThreadSteps)) as restarted:
         assert wait_until(restarted, url, is_done)["completed"] == 5
     assert later.requested_passes == asked
 
@@ -268,16 +269,18 @@ def test_image_and_progress_exist_during_the_first_pass(
 
 def test_reference_image_exists_after_one_pass(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
-    queue = client.app.state.services.comparisons  # type: ignore[attr-defined]
-    step = queue.step
+    make_pass, passes = STEPS["pass of a comparison"], list[int]()
 
-    def once(work: Any, timer: Any) -> Any:
-        if work.completed:
-            raise CancelledError("one is enough")
-        return step(work, timer)
+    def once(context: Any, report: Any, is_canceled: Callable[[], bool], **values: Any) -> Any:
+        passes.append(0)
+        if len(passes) == 1:
+            return make_pass(context, report, is_canceled, **values)
+        while not is_canceled():
+            time.sleep(0.01)
+        raise CancelledError("one is enough")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(queue, "step", once)
+        patch.setitem(cast("dict[str, Any]", STEPS), "pass of a comparison", once)
         url = submit(client, baked, 1000)
         wait_until(client, url, lambda body: body["completed"] == 1)
         assert Image.open(io.BytesIO(client.get(f"{url}/reference.png").content)).size == SIZE

@@ -4,6 +4,7 @@ import io
 import json
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import OpenImageIO
@@ -13,14 +14,16 @@ from PIL import Image
 from session_client import Baked
 from test_comparisons import is_done, wait_until
 
-from relume.image_io.ocio.active_config import using_config
+from relume.image_io.ocio.active_config import config_source, using_config
 from relume.image_io.ocio.config import Config
 from relume.image_io.ocio.lut import SIZE
 from relume.image_io.ocio.view import OcioView
 from relume.image_io.primaries import INTEROP_SPACES
 from relume.image_io.write_image import to_bytes
-from relume_server.batch.process import BatchProcess
+from relume_server.batch.cluster_steps import ClusterSteps
+from relume_server.services import open_steps
 from relume_server.settings import Settings
+from relume_worker.executor import Executors
 
 CONFIG = "ocio://cg-config-latest"
 VIEW = {"display": "sRGB - Display", "view": "ACES 2.0 - SDR 100 nits (Rec.709)"}
@@ -88,15 +91,12 @@ def test_unknown_views_are_rejected_before_rendering(client: TestClient, baked: 
     assert client.post("/api/comparisons", json=comparison).json()["parameter"] == "/look/display/tone_map"
 
 
-def test_render_processes_get_the_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    started: list[list[str]] = []
-
-    def start(command: list[str], **_: object) -> SimpleNamespace:
-        started.append(command)
-        return SimpleNamespace(stdin=io.StringIO(), stdout=io.StringIO(), pid=0, poll=lambda: 0)
-
-    monkeypatch.setattr("subprocess.Popen", start)
-    for arguments in ((CONFIG, "ACEScg"), (CONFIG, None), (None,)):
+def test_config_of_the_server_is_used_by_steps(settings: Settings) -> None:
+    bakes = SimpleNamespace(executors=Executors(num_workers=2))
+    for arguments, expected in (((CONFIG, "ACEScg"), (CONFIG, "ACEScg")), ((CONFIG, None), (CONFIG,)), ((None,), ())):
         with using_config(*arguments):
-            BatchProcess(tmp_path, 1, 2, 3)
-    assert [command[-2:] for command in started] == [[CONFIG, "ACEScg"], ["3", CONFIG], ["2", "3"]]
+            steps = open_steps(settings, cast("Any", None), cast("Any", bakes))
+        process = cast("ClusterSteps", steps)._process
+        assert process.config == expected
+        with using_config(*[*process.config, None][:2]):
+            assert config_source() == expected

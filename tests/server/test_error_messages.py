@@ -27,7 +27,7 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
     ("url", "body", "said"),
     [
         (RENDERS, {"format": "tiff"}, "/format is 'tiff'; give 'exr', 'png', 'webp' or 'mp4'"),
-        (RENDERS, {"looks": []}, "/looks is a list of 0; give at least 1 entry"),
+        (RENDERS, {"looks": []}, "/looks is a list of 0 entries; give at least 1 entry"),
         (RENDERS, {"looks": [1]}, "/looks/0 is 1; give an object"),
         (RENDERS, {"fps": 0}, "/fps is 0; give at least 1"),
         (RENDERS, {"fps": "x"}, "/fps is 'x'; give a whole number"),
@@ -39,7 +39,7 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
             {"path": {"turntable": 4, "start_camera": {"yfov": 40}}},
             "/path/start_camera/to_world is missing; add it",
         ),
-        (RENDERS, {"path": {"cameras": []}}, "/path/cameras is a list of 0; give at least 1 entry"),
+        (RENDERS, {"path": {"cameras": []}}, "/path/cameras is a list of 0 entries; give at least 1 entry"),
         (RENDERS, {"size": "1920x1080"}, "/size is '1920x1080'; give [width, height] in pixels"),
         (RENDERS, {"size": [0, 4]}, "/size/0 is 0; give at least 1"),
         (RENDERS, {"sizes": 3}, "/sizes is unknown; remove it"),
@@ -87,13 +87,14 @@ def test_later_rejections_have_the_same_form(client: TestClient, baked: Baked) -
     assert problem["detail"] == "view is 'back'; give one of front, left"
     assert problem["errors"] == [{"pointer": "/view", "detail": problem["detail"]}]
     problem = refused(client, RENDERS, json={**body, "color_space": "ACEScg"})
-    assert problem["detail"] == "color_space is 'ACEScg'; give none: there is no OpenColorIO config here (RELUME_OCIO)"
+    allowed = "no color space, because there is no OpenColorIO config here (RELUME_OCIO)"
+    assert problem["detail"] == f"color_space is 'ACEScg'; give {allowed}"
     problem = refused(client, RENDERS, json={**body, "path": {"turntable": 8}})
-    assert problem["detail"].startswith("path is 'turntable 8'; give no path, or bake with method probes")
+    assert problem["detail"].startswith("path is 'turntable 8'; give no path, because this bake has fixed cameras")
     problem = refused(client, RENDERS, json={**body, "looks": [{"display": {"exposure": "x"}}]})
     assert problem["errors"][0]["pointer"] == "/looks/0/display/exposure"
     wrong_key = client.put("/api/looks/a", json={"materialz": {}})
-    assert parse_problem(wrong_key)["detail"].startswith("/materialz is {}; give a known name: a look has ")
+    assert parse_problem(wrong_key)["detail"].startswith("/materialz is {}; give one of the sections of a look: ")
 
 
 def test_invalid_queries_and_methods(client: TestClient) -> None:

@@ -3,12 +3,13 @@
 import asyncio
 import gc
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from coroutines import run_in_thread
-from server_fakes import Control, FakeJob
+from server_fakes import Control, fake_job
 
 from relume.core.errors import ProtocolError, StoreError
 from relume_server.runtime.executors import Threads
@@ -26,11 +27,9 @@ class Recorder:
         self.states.append(message.state)
 
 
-class Broken(FakeJob):
-    """A job that fails."""
-
-    def run(self, progress: Any, is_canceled: Any) -> str:
-        raise StoreError("damaged; bake again")
+def fail(progress: Any, is_canceled: Any) -> str:
+    """The work of a job that fails."""
+    raise StoreError("damaged; bake again")
 
 
 class DisconnectedClient(Recorder):
@@ -59,12 +58,12 @@ def run(scenario: Any, recorder: Recorder | None = None) -> tuple[list[str], lis
 
 
 @pytest.mark.parametrize("state", ["precomputing", "shading"])
-def test_freeze_sends_its_state_and_is_ready_after_handover(state: str) -> None:
+def test_freeze_sends_its_state_and_is_ready_after_handover(state: Literal["precomputing", "shading"]) -> None:
     recorder = Recorder()
 
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeJob(control, "/curves/theta_d", state))  # type: ignore[arg-type]
+        freezer.start(view, fake_job(control, "/curves/theta_d", state=state))
         assert await asyncio.to_thread(control.freeze_started.wait, 60)
         assert not freezer.is_done
         control.freeze_gate.set()
@@ -85,7 +84,7 @@ def test_freeze_sends_its_state_and_is_ready_after_handover(state: str) -> None:
 def test_canceled_freeze_gives_nothing() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, fake_job(control, "/curves/theta_d"))
         assert await asyncio.to_thread(control.freeze_started.wait, 60)
         freezer.cancel()
         await asyncio.wait_for(news.wait(), 60)
@@ -97,7 +96,7 @@ def test_canceled_freeze_gives_nothing() -> None:
 def test_failed_freeze_reports_its_reason() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, Broken(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, replace(fake_job(control, "/curves/theta_d"), run=fail))
         await asyncio.wait_for(news.wait(), 60)
         with pytest.raises(StoreError):
             await freezer.take()
@@ -108,7 +107,7 @@ def test_failed_freeze_reports_its_reason() -> None:
 def test_disconnect_ends_the_freeze() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, fake_job(control, "/curves/theta_d"))
         await asyncio.wait_for(news.wait(), 60)
         with pytest.raises(ProtocolError):
             await freezer.take()
@@ -121,7 +120,7 @@ def test_disconnect_ends_the_freeze() -> None:
 def test_session_end_during_a_freeze_leaves_no_thread_and_no_error() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, fake_job(control, "/curves/theta_d"))
         assert await asyncio.to_thread(control.freeze_started.wait, 60)
         await freezer.end()
         assert control.num_cancelled == 1
@@ -133,7 +132,7 @@ def test_session_end_during_a_freeze_leaves_no_thread_and_no_error() -> None:
 def test_canceled_session_end_leaves_no_error() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
-        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        freezer.start(view, fake_job(control, "/curves/theta_d"))
         running = freezer._running
         assert running is not None
         assert await asyncio.to_thread(control.freeze_started.wait, 60)

@@ -14,14 +14,18 @@ from sqlalchemy import update
 from relume.core.errors import CancelledError, RelumeError
 from relume_server.batch import step_registry
 from relume_server.batch.btf_steps import RESULT_FILE, UPLOAD_FILE
-from relume_server.batch.step import Step
-from relume_server.batch.step_claim import claim
-from relume_server.jobs.btf_jobs import BtfQueue
-from relume_server.jobs.job import Quota
-from relume_server.persistence.tables import BtfRow
+from relume_server.errors import make_problem
+from relume_server.jobs.btf_jobs import BtfJobs
 from relume_server.schemas.btfs import BtfRequest
 from relume_worker.database import open_database
 from relume_worker.database.clock import epoch_s
+from relume_worker.database.models import JobRow
+from relume_worker.jobs.claim import claim
+from relume_worker.jobs.job import Quota
+from relume_worker.jobs.job_ledger import JobLedger
+from relume_worker.jobs.job_service import JobService
+from relume_worker.jobs.step import Step
+from relume_worker.lease import new_owner
 from relume_worker.ledger import Ledger
 
 WAIT_S = 30.0
@@ -53,9 +57,11 @@ class Server:
         self.is_wanted: Callable[[], bool] = lambda: False
         self.quotas: list[str] = []
         self._outcome = outcome
-        self.queue = BtfQueue(
-            ledger.sessions, data, self._run, Quota(9, 9), lambda work, *_: self.quotas.append(f"kept {work}"),
-            lambda work: self.quotas.append(f"failed {work}"),
+        rows = JobLedger(ledger.sessions, Quota(9, 9), new_owner())
+        self.service = JobService(rows, self._run, lambda: 1, lambda error: make_problem(error).detail, {})
+        self.jobs = BtfJobs(
+            self.service, data, lambda job, *_: self.quotas.append(f"kept {job}"),
+            lambda job: self.quotas.append(f"failed {job}"),
         )  # fmt: skip
 
     def _run(self, step: Step, report: object, is_wanted: Callable[[], bool]) -> Mapping[str, Any]:
@@ -67,7 +73,7 @@ class Server:
 
 @pytest.fixture
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ledger]:
-    monkeypatch.setattr("relume_worker.lease.HEARTBEAT_S", 2 * WAIT_S)  # a stalled server renews no lease
+    monkeypatch.setattr("relume_worker.jobs.job_service.HEARTBEAT_S", 2 * WAIT_S)  # a stalled server renews no lease
     with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as opened:
         yield opened
 
@@ -79,34 +85,36 @@ def test_files_quota_and_state_of_a_taken_over_job_remain(
     caplog.set_level(logging.WARNING)
     first, second = Server(ledger, tmp_path, outcome), Server(ledger, tmp_path, finishes)
     request = BtfRequest(name="Felt", error=0.05)
-    work = first.queue.submit(request, prepare=lambda into: (into / UPLOAD_FILE).write_bytes(b"sent"))
+    work = first.jobs.submit(request, prepare=lambda into: (into / UPLOAD_FILE).write_bytes(b"sent"))
     folder = tmp_path / "btf-jobs" / work
-    first.queue.start()
+    first.service.start()
     assert first.has_begun.wait(WAIT_S)
     assert first.is_wanted()
     with ledger.sessions.begin() as session:
-        session.execute(update(BtfRow).values(heartbeat=epoch_s() - 60.0))
-    second.queue.start()
+        session.execute(update(JobRow).values(heartbeat=epoch_s() - 60.0))
+    second.service.start()
     assert second.has_begun.wait(WAIT_S)
     assert f"BTF {work} is taken over from" in caplog.text
 
-    first.queue._needed_until = "", 0.0  # the cached check is outdated
+    run = first.service._runs[work][2]
+    assert run is not None
+    run._needed_until_s = 0.0  # the cached check is outdated
     assert not first.is_wanted()
     first.may_go_on.set()
-    first.queue._closing.set()
-    first.queue._thread.join(WAIT_S)
+    first.service._closing.set()
+    wait_until(lambda: not first.service._runs)
     assert f"BTF {work} was taken over by another process" in caplog.text
     assert (folder / UPLOAD_FILE).read_bytes() == b"sent"
     assert first.quotas == []
-    job = second.queue.get(work)
+    job = second.jobs.get(work)
     assert (job.state, job.problem) == ("running", None)
     assert second.is_wanted()
 
     second.may_go_on.set()
-    wait_until(lambda: second.queue.get(work).state == "ready" and not (folder / UPLOAD_FILE).exists())
+    wait_until(lambda: second.jobs.get(work).state == "ready" and not (folder / UPLOAD_FILE).exists())
     assert second.quotas == [f"kept {work}"]
     for server in (first, second):
-        server.queue.close()
+        server.service.close()
 
 
 def wait_until(is_reached: Callable[[], bool]) -> None:
@@ -119,7 +127,7 @@ def wait_until(is_reached: Callable[[], bool]) -> None:
 
 
 def test_step_without_its_file_lock_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("relume_server.batch.step_claim._CHECK_INTERVAL_S", 0.0)
+    monkeypatch.setattr("relume_worker.jobs.claim._CHECK_INTERVAL_S", 0.0)
     canceled: list[bool] = []
 
     def work(shop: Any, report: Any, is_canceled: Callable[[], bool]) -> Mapping[str, Any]:

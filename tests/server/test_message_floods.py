@@ -27,7 +27,7 @@ from relume_server.session.message_rate import (
     MESSAGE_BURST,
     MESSAGES_PER_SECOND,
     WORK_BURST_S,
-    Pace,
+    MessageRateLimit,
 )
 from relume_server.session.receive import MessageReceiver
 from relume_server.settings import Settings
@@ -50,15 +50,15 @@ class Clock:
 
 def after(clock: Clock, num: int, work_s: float = 0.0, rest_s: float = 0.0, are_due: Sequence[bool] = (False,)) -> None:
     """Handle `num` messages of equal work, each `rest_s` after the previous one; return the clock."""
-    pace = Pace(clock, lambda: clock.worked_s, clock.sleep)
+    rate_limit = MessageRateLimit(clock, lambda: clock.worked_s, clock.sleep)
 
     async def take() -> None:
         for k in range(num):
             clock.now_s += rest_s
-            pace.start_message()
+            rate_limit.start_message()
             clock.now_s += work_s
             clock.worked_s += work_s
-            await pace.pause(is_due=are_due[k % len(are_due)])
+            await rate_limit.pause(is_due=are_due[k % len(are_due)])
 
     with pytest.raises(StopIteration):  # it only waits for the clock
         take().send(None)

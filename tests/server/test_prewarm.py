@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 import pg8000
 import pytest
-from server_fakes import InThreadBatches
+from server_fakes import InThreadSteps
 from tiny_scenes import still_life
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import open_bake
+from relume.live.opened.openers import open_bake
 from relume.store.bake_protocol import Recipe
 from relume_server.batch import prewarm as module
 from relume_server.batch.prewarm import Prewarmer
-from relume_server.batch.step import IsNeeded, ProgressCallback, Step
 from relume_server.batch.thumbnails import Thumbnails
 from relume_server.runtime.library import open_library
 from relume_server.settings import Settings
+from relume_worker.jobs.step import IsNeeded, ProgressCallback, Step
 from relume_worker.paths import bake_path
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
@@ -37,7 +37,7 @@ class Steps:
     """Run steps in this process and record them; `before` is called first."""
 
     def __init__(self, data: Path) -> None:
-        self._here = InThreadBatches(Settings(data=data), open_library(1 << 28, 0))
+        self._here = InThreadSteps(Settings(data=data), open_library(1 << 28, 0))
         self.asked: list[tuple[str, str]] = []
         self.is_done = threading.Event()
         self.before: Callable[[IsNeeded], None] = lambda is_wanted: None

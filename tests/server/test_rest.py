@@ -14,12 +14,13 @@ import trimesh
 from fastapi.testclient import TestClient
 from glb_builder import Glb
 from PIL import Image
-from server_fakes import SIZE, Control, InThreadBatches
+from server_fakes import SIZE, Control, InThreadSteps
 from session_client import Baked
 
 from relume.look import Look
 from relume_server.app import create_app
 from relume_server.settings import Settings
+from relume_worker.database.models import JobRow
 from relume_worker.paths import bake_path
 
 WIDTH, HEIGHT = SIZE
@@ -276,13 +277,15 @@ def test_render_resumes_after_a_restart(settings: Settings, client: TestClient, 
     assert wait_until_done(client, url)["state"] == "ready"
     services = client.app.state.services
     identity = url.rsplit("/", 1)[1]
-    services.renders._update(identity, ("ready",), state="running", done=1)  # the state after a killed server
+    services.renders._service.ledger._update(
+        JobRow.id == identity, state="running", done=1
+    )  # the state after a killed server
     status = services.renders.get(url.rsplit("/", 1)[1])
     services.renders.frame_path(status, 1).unlink()
     services.renders.archive_path(status).unlink()
     untouched = services.renders.frame_path(status, 0).stat().st_mtime_ns
     control = Control()
-    with TestClient(create_app(settings, open_library=control.open_library, open_batches=InThreadBatches)) as restarted:
+    with TestClient(create_app(settings, open_library=control.open_library, open_steps=InThreadSteps)) as restarted:
         assert wait_until_done(restarted, url)["state"] == "ready"
         assert restarted.get(f"{url}/frames/1").status_code == 200
     assert services.renders.frame_path(status, 0).stat().st_mtime_ns == untouched

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from server_fakes import Control, InThreadBatches
+from server_fakes import Control, InThreadSteps
 from server_fixtures import open_fake_bakes
 from session_client import ROOM_FIELDS, SIGMA, Baked, Session, open_session
 from sqlalchemy import select, update
@@ -40,7 +40,7 @@ def settings(settings: Settings) -> Settings:
 def other(settings: Settings, client: TestClient) -> Iterator[TestClient]:
     """A second server beside `client`."""
     app = create_app(
-        settings, open_library=Control().open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
+        settings, open_library=Control().open_library, open_steps=InThreadSteps, open_bakes=open_fake_bakes
     )
     with TestClient(app) as opened:
         yield opened

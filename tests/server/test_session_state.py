@@ -60,7 +60,7 @@ def test_shown_views_keep_the_focus_if_possible() -> None:
     shown.show(["left", "front", "left"])
     assert (shown.names, shown.focus) == (("left", "front"), "front")
     shown.set_focus("left")
-    with pytest.raises(ParameterError, match="which are shown"):
+    with pytest.raises(ParameterError, match="one of the displayed views: "):
         shown.set_focus("top")
     shown.hide("left")
     assert (shown.names, shown.focus) == (("front",), "front")

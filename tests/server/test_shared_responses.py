@@ -17,7 +17,7 @@ from session_client import Baked
 
 from relume.core.cache import Cache
 from relume_server.io import streamed_responses as answers_module
-from relume_server.io.streamed_responses import Answers
+from relume_server.io.streamed_responses import StreamedResponses
 from relume_server.runtime.single_flight import SingleFlight
 
 
@@ -29,10 +29,12 @@ class TestAnswers:
     @pytest.fixture
     def answers(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
         monkeypatch.setattr(answers_module, "PIECE_BYTES", 1_000)
-        with closing(Answers(tmp_path)) as new_answers:
+        with closing(StreamedResponses(tmp_path)) as new_answers:
             yield new_answers
 
-    def test_slow_readers_share_one_file_that_is_deleted_after_them(self, answers: Answers, tmp_path: Path) -> None:
+    def test_slow_readers_share_one_file_that_is_deleted_after_them(
+        self, answers: StreamedResponses, tmp_path: Path
+    ) -> None:
         made: list[int] = []
         content = np.arange(10_000, dtype="<f4").reshape(-1, 4)
 
@@ -56,7 +58,7 @@ class TestAnswers:
         assert len(made) == 2  # the first was deleted with its last reader
         assert list(tmp_path.iterdir()) == []
 
-    def test_early_requests_wait_for_the_same_computation(self, answers: Answers) -> None:
+    def test_early_requests_wait_for_the_same_computation(self, answers: StreamedResponses) -> None:
         made: list[int] = []
         may_end = threading.Event()
 
@@ -75,7 +77,7 @@ class TestAnswers:
         assert run_in_thread(scenario()) == [b"it"] * 5
         assert made == [1]
 
-    def test_failures_are_reported_and_retried(self, answers: Answers) -> None:
+    def test_failures_are_reported_and_retried(self, answers: StreamedResponses) -> None:
         async def scenario() -> bytes:
             with pytest.raises(ZeroDivisionError):
                 await answers.stream("it", lambda: bytes(1 // 0), "text/plain", {})

@@ -241,7 +241,7 @@ class TestReconnect:
             ann.text("hello")
             bob.text("hello")
             code, reason = refused(client, baked, ROOM_FIELDS)
-            assert (code, reason) == (1013, "2 people are in this room, its limit; wait until one leaves")
+            assert (code, reason) == (1013, "2 people are in this room, which is its limit; wait until one leaves")
 
 
 def test_viewers_follow_and_cannot_edit(client: TestClient, baked: Baked) -> None:
@@ -321,7 +321,7 @@ def test_rooms_are_limited_and_end_with_their_last_member(client: TestClient, ba
         first.text("hello")
         second.text("hello")
         code, reason = refused(client, baked, {"room": "c" * 24})
-        assert (code, reason) == (1013, "2 rooms are open, the limit; wait until one is closed")
+        assert (code, reason) == (1013, "2 rooms are open, which is the limit; wait until one is closed")
     while True:  # members who left stay for a moment
         with open_session(client, baked.bake, opening={"room": "c" * 24}) as third:
             message = third.websocket.receive()

@@ -25,7 +25,7 @@ def test_opened_services_are_closed_if_startup_fails(tmp_path):
 
     control = Control()
     app = create_app(
-        Settings(data=tmp_path), open_library=control.open_library, open_bakes=bakes, open_batches=no_batches
+        Settings(data=tmp_path), open_library=control.open_library, open_bakes=bakes, open_steps=no_batches
     )
     with pytest.raises(OSError, match="no room for processes"), TestClient(app):
         pass

@@ -11,7 +11,7 @@ from postgres import make_unavailable_error
 from server_fakes import write_tiny_scene
 
 from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
-from relume_server.batch.process import _answer
+from relume_server.batch.cluster_steps import _answer
 from relume_server.errors import make_problem
 from relume_server.io import import_request
 from relume_server.io.import_request import ImportRequest, run_import
@@ -114,7 +114,7 @@ def test_import_that_cannot_be_listed_fails_with_a_reason_and_leaves_no_files(
         raise make_unavailable_error("refused")
 
     monkeypatch.setattr("relume_server.io.import_queue.insert_scene", fail)
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)  # type: ignore[attr-defined]
+    monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", write_tiny_scene)  # type: ignore[attr-defined]
     refused = client.post("/api/scenes", files={"scene": ("triangle.glb", b"which nobody reads")})
     assert refused.status_code == 503
     assert client.get("/api/scenes").json() == []

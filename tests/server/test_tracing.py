@@ -102,7 +102,7 @@ def test_edit_is_traced_from_the_socket_to_the_frame(
     assert all(early <= late for early, late in pairwise(times))
     assert (times[0], times[-1]) == (root.start_time_unix_nano, root.end_time_unix_nano)
     (refused,) = (span for span in spans if span.name == "edit" and span.status.code)
-    assert "old revision" in refused.status.message
+    assert "is not newer than" in refused.status.message
     assert {attributes_of(span)["relume.label"] for span in spans if span.name == "freeze"} == {status["label"]}
 
 

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from relume.store import StoreWriter, create_store, open_store, publish
+from relume.store.publish import publish
+from relume.store.reader import open_store
+from relume.store.writer import StoreWriter, create_store
 
 NUM_WRITERS, NUM_GROUPS = 8, 12
 

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from relume.core.errors import ChunkDamagedError, SchemaVersionError, StoreDeletedError, StoreError, StoreNotFoundError
-from relume.store import StoreWriter, create_store, open_store, publish, schema
+from relume.store import schema
 from relume.store.bake_protocol import ArraySpec
-from relume.store.publish import manifest_digests
+from relume.store.publish import manifest_digests, publish
+from relume.store.reader import open_store
+from relume.store.writer import StoreWriter, create_store
 
 ROWS = 100
 SPEC = ArraySpec("views/front/visibility", (ROWS, 7), "uint8", (8, 7), (32, 7))

@@ -15,10 +15,10 @@ from relume.brdf.term_validation import complete_term
 from relume.lights.light_sampling import NOT_FLAT_RADIUS, make_strata, split_axes
 from relume.lights.local_lights import make_emitter_parts, make_light_strata, prepare_local_lights, rectangle
 from relume.lights.spherical_triangles import NO_LIGHTS
+from relume.live.opened.local_lights import MESH_SAMPLE_FACTOR, SAMPLES
 from relume.look import LightGeometry
-from relume.methods.local_lights import MESH_SAMPLE_FACTOR, SAMPLES
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.local_light_visibility import trace_light_visibility
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.projector import Projector
 from relume.transport.shading.shader import Shader

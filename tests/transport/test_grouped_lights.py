@@ -32,7 +32,7 @@ def test_transposing_bits_twice_restores_them(num_points, num_lights):
 
 
 def test_groups_are_lights_of_one_tree_node(lights):
-    groups = lights.groups
+    groups = lights.clusters
     assert len(np.unique(groups.light_index)) == len(groups.light_index) > 0.8 * lights.num_lights
     for first, end in zip(groups.first[:-1], groups.first[1:], strict=True):
         codes = [int(code) for code in lights.codes[groups.light_index[first:end]]]
@@ -43,7 +43,7 @@ def test_groups_are_lights_of_one_tree_node(lights):
 
 def test_a_group_has_the_irradiance_of_its_lights(lights):
     """Σ E cos θ in luminance, for normals that face all lights: the mean direction equals that of the light."""
-    groups, normals = lights.groups, np.random.default_rng(2).normal(size=(50, 3))
+    groups, normals = lights.clusters, np.random.default_rng(2).normal(size=(50, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     alone = luminance(lights.irradiance)[groups.light_index] * (normals @ lights.direction[groups.light_index].T)
     expected = np.add.reduceat(alone, groups.first[:-1], axis=1)
@@ -52,7 +52,7 @@ def test_a_group_has_the_irradiance_of_its_lights(lights):
 
 
 def test_completely_visible_groups_are_selected(lights):
-    groups, rng = lights.groups, np.random.default_rng(3)
+    groups, rng = lights.clusters, np.random.default_rng(3)
     visible = rng.random((lights.num_lights, 48)) < 0.8
     words = (visible * (np.uint64(1) << np.arange(48, dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
     whole = np.empty(groups.lights.num_lights, np.uint64)

@@ -10,7 +10,7 @@ from tiny_scenes import studio
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.term import Angle
 from relume.lights.spherical_triangles import tessellate_environment
-from relume.transport.light_culling import angle_lower_bounds, list_lights
+from relume.transport.light_culling import CurveSupport, allocate_list, angle_lower_bounds, list_lights
 from relume.transport.light_lists import with_half_angle
 
 RNG = np.random.default_rng(9)
@@ -58,13 +58,12 @@ def test_every_corner_of_a_light_lies_within_its_radius():
 def test_the_list_has_the_visible_lights_in_order(support):
     lights = tessellate_environment(studio(), 150)
     receivers = ref.only_above(ref.make_random_receivers(9, lights.num_lights, seed=7), lights)
-    capacity = 9 * lights.num_lights
-    first, light = np.empty(10, np.int64), np.empty(capacity + 1, np.int32)
-    wi, wo = np.empty((2, 3, capacity), np.float32)
-    num = list_lights(
-        receivers.normal, receivers.tangent, receivers.wo, receivers.visible, lights.direction, lights.radius,
-        np.array([int(Angle.THETA_H)]), np.array([support], np.float32), 0, 9, first, light, wi, wo,
-    )  # fmt: skip
+    listed = allocate_list(9, 9 * lights.num_lights)
+    limits = CurveSupport(np.array([int(Angle.THETA_H)]), np.array([support], np.float32))
+    scratch = np.empty((2, lights.num_lights), np.float32)
+    light_args = lights.direction, lights.radius, limits, 0, scratch
+    num = list_lights(receivers.points, receivers.wo, receivers.visible, *light_args, listed)
+    first, light, wi, wo = listed
     assert num == first[-1]
     visible = ref.visible_lights(receivers, lights.num_lights)
     corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(float)
@@ -88,10 +87,10 @@ def test_two_angles_of_the_half_vector_bound_the_third(pair):
     )
     first, second, half = (angles_numpy(angle, wi, wo) for angle in (*pair, Angle.THETA_H))
     given = np.array([Angle.THETA_D, *pair], np.int64)
-    kinds, support = with_half_angle(given, np.array([1.6, 0.5, 0.2], np.float32))
+    kinds, support = with_half_angle(CurveSupport(given, np.array([1.6, 0.5, 0.2], np.float32)))
     assert list(kinds) == [*given, Angle.THETA_H]
     reached = half[(first <= 0.5) & (second <= 0.2)]
     assert reached.max() <= support[-1] + 1e-3
     assert reached.max() > 0.9 * support[-1]  # no tighter bound is needed
-    kinds, _ = with_half_angle(given, np.array([1.6, np.inf, 0.2], np.float32))
+    kinds, _ = with_half_angle(CurveSupport(given, np.array([1.6, np.inf, 0.2], np.float32)))
     assert list(kinds) == list(given)  # the free curve can take any value

@@ -6,9 +6,9 @@ import numpy as np
 import numpy_reference as ref
 import pytest
 
-from relume.brdf.albedo import PAIRS, pack_reflectance, reflectance_matrix
+from relume.brdf.albedo import PAIRS, material_reflectance, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
-from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, project, recurrence
+from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, recurrence
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
 from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, decay_of, isotropic, radiance_from_patch
@@ -36,7 +36,7 @@ def sides():
     """
     u = (np.arange(1, NUM_PAIRS + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5)) % 1
     wi, wo = by_cosine(u[:, 0], u[:, 1]), by_cosine(u[:, 2], u[:, 3])
-    return wi, wo, *(np.ascontiguousarray(project(w)[:, :NUM_OUTGOING].T) for w in (wi, wo))
+    return wi, wo, *(np.ascontiguousarray(basis_functions(w)[:, :NUM_OUTGOING].T) for w in (wi, wo))
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_a_table_equals_the_sum_of_its_functions():
     sent = radiance_from_patch(even, np.array([0, 2, 3]), frame, vectors.astype(np.float32))
     wo = over_hemisphere(4_000, 3)
     for row, patch in enumerate((0, 2, 3)):
-        exact = even[patch] + project(wo)[:, :NUM_OUTGOING] @ vectors[row].T
+        exact = even[patch] + basis_functions(wo)[:, :NUM_OUTGOING] @ vectors[row].T
         radiance = np.array([ref.evaluate_outgoing(sent, patch, w) for w in wo])
         assert np.linalg.norm(radiance - exact) < 0.12 * np.linalg.norm(exact - even[patch])
         assert np.abs(radiance.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
@@ -80,8 +80,8 @@ def reflect_one_direction(roughness):
     """Outgoing light of metal for one direction, 50 directions of it, and its decay."""
     metal = {**PLAIN, "model": "ggx", "color": [1, 1, 1], "params": {"roughness": roughness, "f0": 0.9}}
     plain = np.ones((2, 50, 3), np.float32)
-    made = ReflectanceOperator.from_materials((pack_reflectance([metal]),), np.zeros(50, np.uint16), plain)
-    vectors = np.repeat(project(over_hemisphere(50, 6))[:, None, :NUM_OUTGOING], 3, axis=1).astype(np.float32)
+    made = ReflectanceOperator.from_materials((material_reflectance([metal]),), np.zeros(50, np.uint16), plain)
+    vectors = np.repeat(basis_functions(over_hemisphere(50, 6))[:, None, :NUM_OUTGOING], 3, axis=1).astype(np.float32)
     of_patches, leaving = made.apply(IncidentLight(plain[0], vectors))
     even = np.zeros((NO_PATCH + 1, 3), np.float32)
     even[:50] = of_patches

@@ -10,10 +10,10 @@ from session_edits import relative_rmse
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.lights.frequency_split import split_frequencies
 from relume.lights.sphere_tiles import choose_tiles
-from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
 from relume.math.local_pca import leading_components
 from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
-from relume.math.zernike import num_functions, project
+from relume.math.zernike import basis_functions, num_functions
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.surface_points import SurfacePoints
@@ -47,13 +47,15 @@ def transfer_matrices_numpy(
     wi = np.einsum("nij,mj->nmi", np.stack([t, np.cross(n, t), n], axis=1), directions.astype(np.float64))
     is_visible = np.unpackbits(visible, axis=1, count=len(directions), bitorder="little")
     weight = is_visible * np.maximum(wi[..., 2], 0) * solid_angles
-    return np.asarray(np.einsum("nm,nmk,mj->nkj", weight, project(wi), harmonics(directions.astype(np.float64))))
+    return np.asarray(
+        np.einsum("nm,nmk,mj->nkj", weight, basis_functions(wi), harmonics(directions.astype(np.float64)))
+    )
 
 
 def lights_of(radiance):
     """Triangles with shadow rays through their centers."""
     return replace(
-        integrate_environment(TILES, RotatedEnvironment.from_radiance(radiance)),
+        integrate_environment(TILES, EnvironmentTexels.from_radiance(radiance)),
         direction=TILES.centroids.astype(np.float32),
     )
 

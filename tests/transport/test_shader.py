@@ -152,7 +152,7 @@ def test_a_narrow_lobe_within_wide_lights_is_shaded():
 def test_most_lights_are_shaded_in_groups(lights, receivers, monkeypatch):
     """A broad term in the whole environment: otherwise the test above would compare lights with themselves."""
     left = []
-    monkeypatch.setattr(shader, "shade_points", lambda *args: left.append(args[2][args[11] - args[10]]))
+    monkeypatch.setattr(shader, "shade_points", lambda *args: left.append(args[1].first[args[6] - args[5]]))
     term, bands = curves_of("blinn_phong", {"exponent": 2.0})
     everything = everything_visible(receivers, lights)
     shaded(term, bands, lights, everything)

@@ -5,7 +5,7 @@ import pytest
 from session_edits import make_look
 
 from relume.core.cache import Cache
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.output.render_image import render_image, render_small
 from relume.views.downsampled import DownsampledStore
 

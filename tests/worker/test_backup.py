@@ -19,7 +19,7 @@ from test_processes import tree_hash
 
 from relume.core.errors import BackupError
 from relume.scene.scene_folder import load_scene
-from relume.store import open_store
+from relume.store.reader import open_store
 from relume_server.persistence.look_store import LookStore
 from relume_worker.backup.create import create_backup
 from relume_worker.backup.repository import BackupRepository

@@ -11,13 +11,13 @@ import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.core.errors import StoreError
-from relume.store import open_store, read_code
+from relume.store.reader import open_store, read_code
 from relume_worker.paths import staging_path
 from relume_worker.runner import CODE_CHANGED_MESSAGE
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 from relume_worker.status import BakeStatus
-from relume_worker.tasks import Job, run_task
+from relume_worker.tasks import BakeInput, run_task
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -111,7 +111,7 @@ def test_partial_bake_of_other_code_restarts_with_a_reason(
 
 
 def test_process_of_other_code_computes_nothing(tmp_path: Path) -> None:
-    job = Job(tmp_path, "0" * 16, SCENE.id, RECIPE, FakeMethod(), OLD)
+    job = BakeInput(tmp_path, "0" * 16, SCENE.id, RECIPE, FakeMethod(), OLD)
     with pytest.raises(StoreError, match="another version of relume"):
         run_task(job, None)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())

@@ -17,7 +17,7 @@ from coroutines import run_in_thread
 
 from relume.core.errors import PlanError
 from relume_worker.dask_executor import DaskExecutor
-from relume_worker.executor import BAKE_NICE, Executors
+from relume_worker.executor import BAKE_NICE, BULK, Executors
 
 
 class FakeTask:
@@ -75,7 +75,7 @@ class FakeNanny:
 
 
 def submit(outcome: object) -> "concurrent.futures.Future[Any]":
-    return DaskExecutor(FakeClient()).submit(lambda: outcome)
+    return DaskExecutor(FakeClient(), BULK).submit(lambda: outcome)
 
 
 def test_future_has_the_result_or_the_error_of_its_task() -> None:
@@ -93,7 +93,7 @@ def test_expected_errors_return_as_results_that_dask_does_not_log(monkeypatch: p
     client = FakeClient()
     monkeypatch.setattr(client, "submit", lambda fn, *args, **_: handed.append(fn(*args)) or FakeTask(handed[-1]))
     with pytest.raises(OSError, match="No space"):
-        DaskExecutor(client).submit(full).result(0)
+        DaskExecutor(client, BULK).submit(full).result(0)
     assert handed
 
 

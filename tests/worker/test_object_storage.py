@@ -22,8 +22,9 @@ from zarr.storage import ObjectStore
 
 from relume.core.errors import ParameterError, StorageError
 from relume.scene.scene_folder import load_scene
-from relume.store import Reader, bake_in_process, open_store
 from relume.store.bake_protocol import Recipe
+from relume.store.reader import Reader, open_store
+from relume.store.run_bake import bake_in_process
 from relume_server.errors import make_problem
 from relume_worker.backup.create import create_backup
 from relume_worker.backup.repository import BackupRepository

@@ -23,7 +23,7 @@ from distributed.security import Security
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.core.errors import PlanError
-from relume.store import bake_in_process
+from relume.store.run_bake import bake_in_process
 from relume_worker.database import open_database
 from relume_worker.executor import TINY_BAKE_RAYS, Executors
 from relume_worker.ledger import Ledger

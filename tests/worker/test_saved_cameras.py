@@ -13,9 +13,10 @@ from relume.core.errors import NotFoundError, ParameterError, PlanError
 from relume.methods.registry import METHODS
 from relume.scene.custom_camera import CustomCamera, make_custom_camera
 from relume.scene.model import Scene
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import Recipe
 from relume.store.publish import array_paths
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_worker import cameras
 from relume_worker.cameras import camera_names_by_scene, delete_camera, list_cameras, resolve_views, store_camera
 from relume_worker.database import open_database

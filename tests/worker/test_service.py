@@ -21,8 +21,9 @@ from relume.core.errors import (
     NotFoundError,
     ParameterError,
 )
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import Task
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_worker import lease, scenes
 from relume_worker.database.models import BakeRow
 from relume_worker.executor import Executors
@@ -31,7 +32,7 @@ from relume_worker.paths import staging_path
 from relume_worker.scenes import delete_bakes, delete_scene, register_scene
 from relume_worker.service import START_S, BakeService
 from relume_worker.status import BakeStatus, TaskCost, bake_id
-from relume_worker.tasks import Job, run_task
+from relume_worker.tasks import BakeInput, run_task
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -159,7 +160,7 @@ def test_stores_are_deleted_if_the_ledger_has_no_disk_space(tmp_path: Path, monk
 def test_bake_leaves_disk_space_for_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         with monkeypatch.context() as patch:
-            patch.setattr("relume.store.room.RESERVE_BYTES", 1 << 60)
+            patch.setattr("relume.store.disk_space.RESERVE_BYTES", 1 << 60)
             patch.setattr("relume_worker.service.check_budget", lambda *_: None)
             status = follow(service, service.submit(SCENE.id, RECIPE))
             assert (status.state, (status.problem or "")[:9]) == ("failed", "disk full")
@@ -369,7 +370,7 @@ def test_bake_taken_over_by_another_process_is_left_to_it(
 ) -> None:
     has_begun, may_go_on = threading.Event(), threading.Event()
 
-    def stall(job: Job, task: Task) -> TaskCost:
+    def stall(job: BakeInput, task: Task) -> TaskCost:
         has_begun.set()
         assert may_go_on.wait(30)
         return run_task(job, task)
@@ -415,7 +416,7 @@ def test_bake_deleted_during_a_task_is_not_a_defect(
 ) -> None:
     met = threading.Event()
 
-    def run_deleted(job: Job, task: Task) -> TaskCost:
+    def run_deleted(job: BakeInput, task: Task) -> TaskCost:
         delete_bakes(service.data_dir, service.ledger, [job.bake_id])
         met.set()
         raise KeyError("lights/irradiance")  # zarr's error for an array without its folder

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from relume.core.errors import DiskBudgetError, MemoryBudgetError
 from relume.store.bake_protocol import Plan
-from relume.store.room import RESERVE_BYTES
+from relume.store.disk_space import RESERVE_BYTES
 
 REMEDY = "give fewer lights, a smaller size or fewer views"
 
@@ -81,11 +81,11 @@ def _system_available_bytes() -> int:
 
 
 def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
-    """Reject a plan that needs more memory or disk than there is.
+    """Reject a plan that needs more memory or disk space than is available.
 
     Args:
-        plan: of the bake.
-        data_dir: on the disk for the store.
+        plan: plan of the bake.
+        data_dir: data directory on the disk for the store.
         num_processes: concurrent worker processes on this machine; 0 if they run elsewhere.
     Raises:
         MemoryBudgetError, DiskBudgetError: the plan exceeds it; the message has needed and available bytes, and

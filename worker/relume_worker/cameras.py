@@ -43,7 +43,7 @@ def store_camera(ledger: Ledger, scene_id: str, camera: CustomCamera) -> bool:
     """Store a camera under its name; bakes of its previous version are unchanged.
 
     Args:
-        ledger: of the scene. scene_id: of the scene. camera: with its name.
+        ledger: ledger of the scene. scene_id: id of the scene. camera: camera, with its name.
     Returns:
         True if the name is new.
     Raises:
@@ -69,7 +69,7 @@ def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
     """Delete a placed camera.
 
     Args:
-        ledger: of the scene. scene_id: of the scene. name: of the camera.
+        ledger: ledger of the scene. scene_id: id of the scene. name: name of the camera.
     Raises:
         NotFoundError: there is none. ParameterError: a camera of the file has this name.
     """
@@ -79,14 +79,14 @@ def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
             delete(CameraRow).where(CameraRow.scene_id == scene_id, CameraRow.name == name).returning(CameraRow.name)
         )
         if session.scalars(statement).first() is None:
-            raise NotFoundError(f"the scene has no camera {name[:80]!r} that a user placed")
+            raise NotFoundError(f"the scene has no camera {name[:80]!r} that a user placed; place it first")
 
 
 def resolve_views(ledger: Ledger, record: SceneRecord, requested: Sequence[str | CustomCamera]) -> Views:
     """Resolve the views of a recipe.
 
     Args:
-        ledger: with the placed cameras. record: of the scene.
+        ledger: ledger with the placed cameras. record: record of the scene.
         requested: names of file or placed cameras, or cameras; empty: all cameras of the file.
     Returns:
         Names of all views, each once, in order; and the custom cameras among them.

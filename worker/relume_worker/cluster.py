@@ -13,7 +13,14 @@ import dask
 from distributed import Nanny
 
 from relume.core.errors import ParameterError, PlanError
-from relume_worker.executor import DASK_CONFIG, SINGLE_THREAD_ENV, WORKER_PRELOAD, check_certificates, num_cores
+from relume_worker.executor import (
+    DASK_CONFIG,
+    SINGLE_THREAD_ENV,
+    WORKER_PLACES,
+    WORKER_PRELOAD,
+    check_certificates,
+    num_cores,
+)
 
 log = logging.getLogger(__name__)
 
@@ -21,7 +28,7 @@ JOIN_S = 120
 
 
 def join(scheduler: str, num_processes: int | None = None) -> int:
-    """Run worker processes, one thread each, until SIGINT or SIGTERM, or until the scheduler is gone.
+    """Run worker processes until SIGINT or SIGTERM, or until the scheduler is gone.
 
     Args:
         scheduler: tcp://host:port, or tls://.
@@ -61,7 +68,8 @@ async def _join(scheduler: str, num_processes: int) -> int:
 def _nanny(scheduler: str) -> Nanny:
     return Nanny(
         scheduler,
-        nthreads=1,
+        nthreads=len(WORKER_PLACES),
+        resources=WORKER_PLACES,
         dashboard=False,
         local_directory=tempfile.gettempdir(),
         death_timeout=JOIN_S,

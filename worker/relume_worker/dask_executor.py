@@ -34,16 +34,17 @@ def _attempt(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
 class DaskExecutor(Executor):
     """Tasks of one Dask client; each runs even if an identical one has run before."""
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: Any, place: str) -> None:
         """
         Args:
             client: a connected `distributed.Client`, which its creator closes.
+            place: Dask resource of which each task takes one.
         """
-        self._client = client
+        self._client, self._place = client, place
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Submit a call. Its future raises KilledWorker if the worker died, CancelledError if the cluster is gone."""
-        task = self._client.submit(_attempt, fn, *args, pure=False, **kwargs)
+        task = self._client.submit(_attempt, fn, *args, pure=False, resources={self._place: 1}, **kwargs)
         outcome: Future[Any] = Future()
         self._client.loop.add_callback(_forward_outcome, task, outcome)
         return outcome

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from relume.store.bake_protocol import Plan
 from relume_worker.executor import is_tiny, num_cores
 
-_MAX_EXTRAPOLATION = 8.0  # a bake may have so many times the work of the largest measured one
+_MAX_EXTRAPOLATION = 8.0  # largest work of a bake, relative to the largest measured one
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def estimate_seconds(
     any. Much smaller bakes are mostly overhead: additional work takes the planned time, unless they were faster.
 
     Args:
-        plan: of the bake.
+        plan: plan of the bake.
         completed: measured bakes of any scenes.
         num_workers: concurrent tasks.
         load_factor: expected threads per core.

@@ -3,6 +3,10 @@
 A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes less. So a bake of at most
 `TINY_BAKE_S`, or of `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES`, runs in this process, one task at a time on the kernels'
 own threads, and the cluster starts with the first larger one. Its processes yield to interactive work.
+
+Each worker process has two places, which are Dask resources: one for bulk work (tasks of bakes, frames of animations),
+on one core; one for work that a person waits for (stills, thumbnails), on all cores. So nobody waits for the end of a
+stranger's task.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ import os
 import signal
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from multiprocessing import resource_tracker
@@ -36,7 +41,10 @@ CONNECT_S = 10
 BAKE_NICE = 10
 WORKER_PRELOAD = ["relume_worker.executor"]  # Dask's name for modules whose `dask_setup` runs in each process
 
-# One Python thread per process, so one thread for every library below it.
+# Places of a process, and their number; see above. `relume worker` offers them, and so must workers that others start.
+BULK, URGENT = "bulk", "urgent"
+WORKER_PLACES = {BULK: 1, URGENT: 1}
+# One Python thread per place, so one thread for every library below it.
 SINGLE_THREAD_ENV = dict.fromkeys(
     ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
@@ -84,6 +92,7 @@ class Executors:
         self.scheduler = scheduler
         self.num_workers = num_workers or num_cores()
         self._lock = threading.Lock()
+        self._num_users, self._last_used_s = 0, time.monotonic()
         self._local: ThreadPoolExecutor | None = None
         self._cluster: Any = None
         self._client: Any = None
@@ -95,8 +104,23 @@ class Executors:
                 self._local = ThreadPoolExecutor(1, thread_name_prefix="relume-tiny-bake")
             return self._local
 
-    def cluster(self) -> Executor:
-        """The Dask cluster. Raises PlanError if the scheduler does not answer."""
+    @contextlib.contextmanager
+    def keep_cluster(self) -> Iterator[None]:
+        """Keep the cluster during a job, and for a while afterwards."""
+        with self._lock:
+            self._num_users += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._num_users, self._last_used_s = self._num_users - 1, time.monotonic()
+
+    def cluster(self, place: str = BULK) -> Executor:
+        """The Dask cluster. Raises PlanError if the scheduler does not answer, or its workers are not relume's.
+
+        Args:
+            place: `BULK` or `URGENT`.
+        """
         with self._lock:
             if self._client is not None and self._client.status != "running":  # the scheduler is gone
                 with contextlib.suppress(Exception):  # nobody is connected any more
@@ -104,23 +128,25 @@ class Executors:
                 self._client = None
             if self._client is None:
                 self._client = self._connect()
-            return DaskExecutor(self._client)
+            return DaskExecutor(self._client, place)
 
     @property
     def has_cluster(self) -> bool:
         """True if the cluster is running."""
         return self._client is not None
 
-    def cluster_threads(self) -> int:
-        """Concurrent tasks of the cluster; at least 1."""
+    def num_processes(self) -> int:
+        """Worker processes of the cluster, hence concurrent bulk tasks; before it starts, as many as it will have."""
         with self._lock:
-            counts = self._client.nthreads() if self._client is not None else {}
-        return max(1, int(sum(counts.values())))
+            if self._client is None:
+                return self.num_workers
+            return max(1, len(self._client.nthreads()))
 
-    def stop_cluster(self) -> None:
-        """End the embedded worker processes; the next bake starts new ones if needed. No task may be running."""
+    def stop_idle_cluster(self, idle_s: float) -> None:
+        """End the embedded worker processes if no job has used them for so long; the next job starts new ones."""
         with self._lock:
-            if self._cluster is not None:
+            is_idle = self._num_users == 0 and time.monotonic() - self._last_used_s > idle_s
+            if self._cluster is not None and is_idle:
                 self._stop_cluster()
 
     def resident_bytes(self) -> int:
@@ -154,11 +180,14 @@ class Executors:
             check_certificates(self.scheduler)
             address = self.scheduler or self._start_cluster()
             try:
-                return Client(address, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+                client = Client(address, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
             except (OSError, ValueError) as error:
                 raise PlanError(
-                    f"the scheduler {address} does not answer ({error}); start it, then bake again"
+                    f"the scheduler {address} does not answer ({error}); start it, then try again"
                 ) from None
+            if self.scheduler:
+                _check_places(client)
+            return client
 
     def _start_cluster(self) -> Any:
         """Start processes on this machine. Every local account can reach their ports, and Dask runs anything for its
@@ -174,7 +203,8 @@ class Executors:
         with _without_interrupts(), dask.config.set(NO_HTTP_ROUTES):
             self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=self.num_workers,
-                threads_per_worker=1,
+                threads_per_worker=len(WORKER_PLACES),
+                resources=WORKER_PLACES,
                 processes=True,
                 host="127.0.0.1",
                 security=Security.temporary(),  # type: ignore[no-untyped-call]
@@ -196,6 +226,17 @@ def check_certificates(scheduler: str | None) -> None:
         raise PlanError(
             f"the scheduler {scheduler} uses TLS, but no certificates are set here; set "
             "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and the related certificates and keys (docs/operations.md)"
+        )
+
+
+def _check_places(client: Any) -> None:
+    """Raise PlanError if the cluster's workers offer no places: their tasks would wait for ever."""
+    workers = client.scheduler_info(n_workers=-1)["workers"].values()
+    if workers and not any(BULK in worker["resources"] for worker in workers):
+        client.close()
+        raise PlanError(
+            "the workers of the scheduler have no places for relume's tasks; start them with `relume worker`, or with "
+            f"--nthreads 2 --resources '{BULK}=1 {URGENT}=1'"
         )
 
 

@@ -62,7 +62,7 @@ def log_taken_over(noun: str, identity: str, previous_owner: str) -> None:
 
 
 def log_lost_lease(noun: str, identity: str) -> None:
-    """Log that this process was suspended or cut off for longer than its lease. noun, identity: of its job."""
+    """Log that this process was suspended or cut off for longer than its lease. noun, identity: the job."""
     log.warning(
         "%s %s was taken over by another process while this one was suspended: its work here is dropped",
         noun, identity, extra={"fields": {noun.lower(): identity}},
@@ -73,7 +73,7 @@ def is_alive(owner: str, heartbeat: float, now: float) -> bool:
     """True if an owner still holds its lease, as far as this process can tell.
 
     Args:
-        owner: of the lease. heartbeat, now: seconds since 1970 by the database's clock.
+        owner: owner of the lease. heartbeat, now: seconds since 1970 by the database's clock.
     """
     return now - heartbeat <= LEASE_S and may_run(owner)
 

@@ -4,7 +4,7 @@
       ▲                 │ └─────▶ failed     submitting a failed or canceled bake queues it again; finished tasks stay
       └───submit────────┴───────▶ canceled
 
-Every change is one statement that names the state it expects, so that processes which race cannot both win.
+Every change is one statement that names the state it expects, so that of two racing processes only one succeeds.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from relume_worker.database.clock import epoch_s
 from relume_worker.database.models import BakeRow, TaskRow
 from relume_worker.estimate import CompletedBake, crowding, machine_load
 from relume_worker.executor import is_tiny
-from relume_worker.fair_share import WaitingBake
+from relume_worker.jobs.fair_share import Waiting
 from relume_worker.lease import is_alive, log_taken_over
 from relume_worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 
@@ -47,8 +47,8 @@ class Ledger:
         """Queue a bake; the same recipe under the same code is the same bake, and a failed or canceled one resumes.
 
         Args:
-            scene_id: of an existing scene. recipe: of the bake.
-            plan: its cost. client: for fair scheduling.
+            scene_id: id of an existing scene. recipe: recipe of the bake.
+            plan: cost of the bake. client: user, for fair scheduling.
         Returns:
             The bake's id.
         Raises:
@@ -119,12 +119,12 @@ class Ledger:
         """Cancel a queued or running bake; its owner notices at its next heartbeat."""
         return self._change(identity, ("queued", "running"), state="canceled", seconds_left=None, phase=None)
 
-    def claimable(self) -> list[WaitingBake]:
+    def claimable(self) -> list[Waiting]:
         """Bakes without a live owner, longest waiting first: queued, or left by a dead owner."""
         query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
         with self.sessions() as session:
             rows = [row for row, now in session.execute(query) if not _is_owned(row, now)]
-        return [WaitingBake(row.id, row.client or "", False, row.queued) for row in rows]
+        return [Waiting(row.id, row.client or "", False, row.queued) for row in rows]
 
     def claim(self, identity: str, owner: str) -> bool:
         """Take the lease of a bake and set it running. False if another owner has it."""
@@ -163,10 +163,10 @@ class Ledger:
         """Give up the lease; a running bake changes to `state`, a canceled one stays canceled.
 
         Args:
-            identity: of the bake. owner: of its lease; otherwise nothing changes.
+            identity: id of the bake. owner: owner of its lease; otherwise nothing changes.
             state: final state.
-            problem: a sentence, if it has failed.
-            num_bytes: of the store, if it is ready.
+            problem: a sentence, if the bake has failed.
+            num_bytes: size of the store in bytes, if it is ready.
         Returns:
             As `release`.
         """
@@ -196,13 +196,11 @@ class Ledger:
         """Record that a task's shards are on disk; idempotent.
 
         Args:
-            identity: of the bake. owner: of its lease. task: finished one.
-            cost: seconds and rays.
-            attempts: including this one.
+            identity: id of the bake. owner: owner of its lease. task: the finished task.
+            cost: seconds and rays. attempts: number of attempts, including this one.
         Returns:
-            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted:
-                nothing is
-            recorded.
+            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted;
+            then nothing is recorded.
         """
         row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
         with self.sessions.begin() as session:
@@ -215,7 +213,7 @@ class Ledger:
         """Delete the task rows of a bake whose unfinished store is missing or damaged.
 
         Args:
-            identity: of the bake. owner: of its lease; None: nobody runs it.
+            identity: id of the bake. owner: owner of its lease; None: nobody runs it.
         Returns:
             False if another owner has the lease: nothing is deleted.
         """
@@ -235,7 +233,7 @@ class Ledger:
         """Restart a bake from nothing, under this code.
 
         Args:
-            identity: of the bake. owner: process that runs it. code: its code version.
+            identity: id of the bake. owner: process that runs it. code: its code version.
             run: new run marker.
             reason: one sentence, if it had finished tasks.
         Returns:
@@ -264,7 +262,7 @@ class Ledger:
         """Time per stage of the newest ready bakes of a method, of this scene if there are any.
 
         Args:
-            scene_id: whose bakes are preferred. method: name of the transfer method.
+            scene_id: scene whose bakes are preferred. method: name of the transfer method.
             num_workers: concurrent tasks of bakes that are not tiny.
             limit: number of bakes to read.
         Returns:

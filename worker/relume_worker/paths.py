@@ -12,7 +12,7 @@ _ID = re.compile(r"[0-9a-f]{16}")
 
 def _check_id(identity: str) -> str:
     if not _ID.fullmatch(identity):
-        raise NotFoundError(f"{identity[:40]!r} is not an id; ids are 16 hexadecimal digits")
+        raise NotFoundError(f"{identity[:40]!r} is not an id; give 16 hexadecimal digits")
     return identity
 
 

@@ -24,7 +24,7 @@ class ExpectedWork:
 
     Attributes:
         seconds: total, None if unknown.
-        stage_fractions: of the time, by stage, None if unknown.
+        stage_fractions: fractions of the time, by stage, None if unknown.
         parallel: concurrent tasks.
     """
 
@@ -38,7 +38,7 @@ class Progress:
 
     Stages are weighted by their fraction of the time of finished bakes, and tasks within a stage by their rows. If
     there are no finished bakes, earlier stages are weighted by their rays in the plan, and the last one, by far the
-    longest, has the rest; rate and remaining time then refer to the current stage.
+    longest, gets the rest; rate and remaining time then refer to the current stage.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Progress:
     ) -> None:
         """
         Args:
-            plan: of the bake. initial: progress before an interruption. expected_work: from finished bakes.
+            plan: plan of the bake. initial: progress before an interruption. expected_work: from finished bakes.
             clock: monotonic seconds.
         """
         self._clock, self._expected_work = clock, expected_work or ExpectedWork()
@@ -95,7 +95,7 @@ class Progress:
         """Count a finished task.
 
         Args:
-            task: finished one. cost: seconds and rays.
+            task: the finished task. cost: seconds and rays.
             is_local: true if it was done in this run, not before an interruption.
         """
         previous = self._done

@@ -1,7 +1,7 @@
 """Run one bake: stages in order, unfinished tasks to an executor, finished ones to the ledger.
 
-It can be killed at any time: the next run continues where the ledger is, and the published store is the same, bit for
-bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
+It can be killed at any time: the next run continues after the tasks in the ledger, and the published store is the same,
+bit for bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
 """
 
 from __future__ import annotations
@@ -31,9 +31,11 @@ from relume.core.errors import (
 from relume.core.filesystem import remove_folder
 from relume.core.folder_size import folder_bytes
 from relume.scene.model import Scene
-from relume.store import open_store, publish, read_code, run_bake
+from relume.store import run_bake
 from relume.store.bake_protocol import Task
-from relume.store.room import check_disk_space
+from relume.store.disk_space import check_disk_space
+from relume.store.publish import publish
+from relume.store.reader import open_store, read_code
 from relume_worker.database.retry import Given, Result, with_retry
 from relume_worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
 from relume_worker.ledger import Ledger
@@ -44,9 +46,9 @@ from relume_worker.status import Phase, TaskCost
 from relume_worker.storage import push
 from relume_worker.storage.partial_uploads import PartialUploads, delete_partial, fetch_partial
 from relume_worker.task_notes import delete_note, read_note
-from relume_worker.tasks import Job, idle_timer, load_registered_scene, run_task
+from relume_worker.tasks import BakeInput, idle_timer, load_registered_scene, run_task
 
-SCHEDULER_LOST_MESSAGE = "the scheduler is gone; start it, then bake again; finished tasks are saved"
+SCHEDULER_LOST_MESSAGE = "the scheduler is gone; start it, then try again; finished tasks are saved"
 CODE_CHANGED_MESSAGE = (
     "relume was updated since this bake started; it starts again, because one version must make all of it"
 )
@@ -70,7 +72,7 @@ class BakeRunner:
     """
 
     ledger: Ledger
-    job: Job
+    bake: BakeInput
     owner: str
     executor: Executor
     max_in_flight: Callable[[], int]
@@ -85,14 +87,14 @@ class BakeRunner:
 
     def run(self) -> None:
         """Bake and publish; every failure is recorded in the ledger as a state and a sentence."""
-        with LeaseRenewer(self.ledger.renew_lease, self.job.bake_id, self.owner), idle_timer.keep_awake():
+        with LeaseRenewer(self.ledger.renew_lease, self.bake.bake_id, self.owner), idle_timer.keep_awake():
             delete_note(self._staging)  # of an earlier run
             self._run()
             delete_note(self._staging)
         self.on_change()
 
     def _run(self) -> None:
-        identity = self.job.bake_id
+        identity = self.bake.bake_id
         try:
             num_bytes = self._bake()
             push(self._target)
@@ -123,40 +125,40 @@ class BakeRunner:
         Raises:
             CancelledError: another process has the bake.
         """
-        if not self._call_ledger(self.ledger.renew_lease, self.job.bake_id, self.owner):
+        if not self._call_ledger(self.ledger.renew_lease, self.bake.bake_id, self.owner):
             raise CancelledError("another process has the bake")
 
     def _bake(self) -> int:
-        job, target, staging = self.job, self._target, self._staging
+        bake, target, staging = self.bake, self._target, self._staging
         if target.exists():  # published, and then killed before the ledger was updated
             return folder_bytes(target)
         self._start_or_resume()
-        status = self._call_ledger(self.ledger.bake, job.bake_id)
-        initial_progress = status.progress if self._call_ledger(self.ledger.finished_tasks, job.bake_id) else 0.0
+        status = self._call_ledger(self.ledger.bake, bake.bake_id)
+        initial_progress = status.progress if self._call_ledger(self.ledger.finished_tasks, bake.bake_id) else 0.0
         progress = Progress(status.plan, initial_progress, self.expected_work)
         self._heartbeat(progress, "reading")
-        scene = job.recipe.add_cameras(load_registered_scene(job.data_dir, job.scene_id))
-        run_bake.create_staging_store(job.method, scene, job.recipe, staging)
-        for stage in range(len(job.method.stages)):
+        scene = bake.recipe.add_cameras(load_registered_scene(bake.data_dir, bake.scene_id))
+        run_bake.create_staging_store(bake.method, scene, bake.recipe, staging)
+        for stage in range(len(bake.method.stages)):
             self._run_stage(scene, stage, progress)
         self._heartbeat(progress, "publishing")
         try:
             return publish(staging, target, self._renew_lease)
         except ChunkDamagedError:
-            if self._call_ledger(self.ledger.delete_tasks, job.bake_id, self.owner):
+            if self._call_ledger(self.ledger.delete_tasks, bake.bake_id, self.owner):
                 shutil.rmtree(staging, ignore_errors=True)
             raise
 
     def _start_or_resume(self) -> None:
         """Resume an earlier run if it is here and by the same code; otherwise start from nothing."""
-        identity, staging = self.job.bake_id, self._staging
+        identity, staging = self.bake.bake_id, self._staging
         run = self._call_ledger(self.ledger.get_run, identity)
         is_local = staging.exists() and get_run(staging) == run
         finished_tasks = self._call_ledger(self.ledger.finished_tasks, identity)
         if not is_local and run is not None and fetch_partial(staging, identity, run, finished_tasks):
             is_local = True
             set_run(staging, run)
-        if is_local and read_code(staging) == self.job.code:
+        if is_local and read_code(staging) == self.bake.code:
             self._partial_uploads = PartialUploads(staging, identity, run, finished_tasks) if run is not None else None
             return
         # without finished tasks, files here are leftovers of a deleted bake
@@ -166,15 +168,15 @@ class BakeRunner:
         self._renew_lease()
         shutil.rmtree(staging, ignore_errors=True)
         run = start_run(staging)
-        if not self._call_ledger(self.ledger.restart, identity, self.owner, self.job.code, run, reason):
+        if not self._call_ledger(self.ledger.restart, identity, self.owner, self.bake.code, run, reason):
             raise CancelledError("the bake was stopped")
         self._partial_uploads = PartialUploads(staging, identity, run, ())
 
     def _run_stage(self, scene: Scene, stage: int, progress: Progress) -> None:
-        job = self.job
-        tasks = run_bake.create_stage(job.method, scene, job.recipe, self._staging, stage)
-        progress.begin_stage(tasks, last=stage == len(job.method.stages) - 1)
-        finished_costs = self._call_ledger(self.ledger.finished_tasks, job.bake_id)
+        bake = self.bake
+        tasks = run_bake.create_stage(bake.method, scene, bake.recipe, self._staging, stage)
+        progress.begin_stage(tasks, last=stage == len(bake.method.stages) - 1)
+        finished_costs = self._call_ledger(self.ledger.finished_tasks, bake.bake_id)
         pending: deque[tuple[Task, int]] = deque()
         for task in tasks:
             if (cost := finished_costs.get((stage, task.index))) is not None:
@@ -183,12 +185,12 @@ class BakeRunner:
                 pending.append((task, 1))
         self._heartbeat(progress, self._phase(stage, progress))
         while pending or self._in_flight:
-            check_disk_space(job.data_dir)
+            check_disk_space(bake.data_dir)
             num_free = self._num_free_slots(len(pending))
             while pending and num_free > 0:
                 num_free -= 1
                 task, attempt = pending.popleft()
-                self._in_flight[self.executor.submit(run_task, job, task)] = task, attempt
+                self._in_flight[self.executor.submit(run_task, bake, task)] = task, attempt
             done_futures, _ = wait(self._in_flight, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
             for future in done_futures:
                 self._collect(future, pending, progress)
@@ -221,7 +223,7 @@ class BakeRunner:
             self._in_flight.clear()  # submitted while the scheduler disappeared, they would never end
             raise RelumeError(SCHEDULER_LOST_MESSAGE) from error
         except Exception as error:
-            if not _is_lost_process(error):
+            if not is_lost_process(error):
                 raise
             if attempt == MAX_ATTEMPTS:
                 raise RelumeError(
@@ -239,7 +241,7 @@ class BakeRunner:
         """Log a dead process once, though it had several tasks."""
         now_s = time.monotonic()
         if now_s > self._last_loss_s + LOSS_LOG_INTERVAL_S:
-            extra = {"fields": {"bake": self.job.bake_id}}
+            extra = {"fields": {"bake": self.bake.bake_id}}
             log.warning("a worker process died; its tasks go to another", extra=extra)
         self._last_loss_s = now_s
 
@@ -247,7 +249,7 @@ class BakeRunner:
         """Record a finished task, after its shards are stored where other machines find them."""
         if self._partial_uploads is not None:
             self._partial_uploads.store((task.stage, task.index))
-        if not self._call_ledger(self.ledger.finish_task, self.job.bake_id, self.owner, task, cost, attempt):
+        if not self._call_ledger(self.ledger.finish_task, self.bake.bake_id, self.owner, task, cost, attempt):
             raise CancelledError("the bake was deleted, or another process has it")
 
     def _heartbeat(self, progress: Progress, phase: Phase) -> None:
@@ -256,7 +258,7 @@ class BakeRunner:
             self._phase_entered = phase, time.time()
         phase_fields = dict(zip(("phase", "phase_since"), self._phase_entered, strict=True))
         if self.is_stopped() or not self._call_ledger(
-            self.ledger.heartbeat, self.job.bake_id, self.owner, **progress.fields(), **phase_fields
+            self.ledger.heartbeat, self.bake.bake_id, self.owner, **progress.fields(), **phase_fields
         ):
             raise CancelledError("the bake was stopped")
         self.on_change()
@@ -280,7 +282,7 @@ class BakeRunner:
 
     def _exists(self) -> bool:
         try:
-            self._call_ledger(self.ledger.bake, self.job.bake_id)
+            self._call_ledger(self.ledger.bake, self.bake.bake_id)
         except NotFoundError:
             return False
         return True
@@ -288,7 +290,7 @@ class BakeRunner:
     def _error_message(self, error: Exception) -> str:
         """Error and remedy, in one line."""
         if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
-            needed_bytes = self._call_ledger(self.ledger.bake, self.job.bake_id).plan.planned_bytes
+            needed_bytes = self._call_ledger(self.ledger.bake, self.bake.bake_id).plan.planned_bytes
             missing_text = bytes_text(max(1_000_000, needed_bytes - folder_bytes(self._staging)))
             return f"disk full; free {missing_text}, then bake again; finished tasks are saved"
         if isinstance(error, RelumeError):
@@ -303,14 +305,14 @@ class BakeRunner:
 
     @property
     def _target(self) -> Path:
-        return bake_path(self.job.data_dir, self.job.bake_id)
+        return bake_path(self.bake.data_dir, self.bake.bake_id)
 
     @property
     def _staging(self) -> Path:
-        return staging_path(self.job.data_dir, self.job.bake_id)
+        return staging_path(self.bake.data_dir, self.bake.bake_id)
 
 
-def _is_lost_process(error: Exception) -> bool:
+def is_lost_process(error: Exception) -> bool:
     """True if a task ended because its process did."""
     if isinstance(error, BrokenExecutor):
         return True

@@ -56,7 +56,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
     """Store a scene; the same content is the same scene, with its newest name and warnings.
 
     Args:
-        data_dir: of scenes. ledger: of scenes.
+        data_dir: data directory of scenes. ledger: ledger of scenes.
         scene: from an importer.
     Returns:
         The scene's id.
@@ -93,8 +93,8 @@ def insert_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping
     """Insert the row of a scene whose files are in place.
 
     Args:
-        data_dir: of scenes. ledger: of scenes.
-        scene_id: of the scene. summary: see `summarize_scene`.
+        data_dir: data directory of scenes. ledger: ledger of scenes.
+        scene_id: id of the scene. summary: see `summarize_scene`.
     """
     push(scene_path(data_dir, scene_id))
     row = SceneRow(id=scene_id, name=summary["name"], created=time.time(), summary=json.dumps(summary))
@@ -126,8 +126,8 @@ def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
     """Delete a scene with its bakes and their stores, which are useless without it.
 
     Args:
-        data_dir: of scenes and stores. ledger: of both.
-        scene_id: of the scene; its running bakes are canceled.
+        data_dir: data directory of scenes and stores. ledger: ledger of both.
+        scene_id: id of the scene; its running bakes are canceled.
     Raises:
         NotFoundError: there is no such scene.
     """
@@ -154,8 +154,8 @@ def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
     """Delete bakes with their stores, finished or not.
 
     Args:
-        data_dir: of stores. ledger: of bakes.
-        ids: of bakes; running ones are canceled.
+        data_dir: data directory of stores. ledger: ledger of bakes.
+        ids: ids of bakes; running ones are canceled.
     """
     try:
         _delete_bake_rows(ledger, ids)

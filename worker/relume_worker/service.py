@@ -1,4 +1,4 @@
-"""Bake service for server and command line; the ledger and the stores own everything that must survive its threads."""
+"""Bake service for server and command line; all that must survive its threads is in ledger and stores."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from relume.core.errors import NotFoundError, ParameterError, StorageError
 from relume.core.source_hash import bake_code
-from relume.store import read_code
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
+from relume.store.reader import read_code
 from relume_worker.backup.restore import refuse_unfinished
 from relume_worker.budget import check_budget
 from relume_worker.database import open_database
 from relume_worker.database.failures import DatabaseError
 from relume_worker.estimate import crowding, estimate_seconds, machine_load
 from relume_worker.executor import Executors, is_tiny
-from relume_worker.fair_share import FairShare
 from relume_worker.idle_timer import idle_seconds
+from relume_worker.jobs.fair_share import FairShare
 from relume_worker.lease import new_owner
 from relume_worker.ledger import Ledger
 from relume_worker.paths import bake_path, scene_path
@@ -36,7 +36,7 @@ from relume_worker.status_bus import BlockedBake, StatusBus, Subscription
 from relume_worker.storage import get_storage, is_in_storage, push
 from relume_worker.storage.partial_uploads import delete_partial
 from relume_worker.task_notes import delete_note
-from relume_worker.tasks import Job, idle_timer, load_registered_scene
+from relume_worker.tasks import BakeInput, idle_timer, load_registered_scene
 
 log = logging.getLogger(__name__)
 
@@ -66,7 +66,7 @@ class BakeService:
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
             methods: available methods by name; None: relume's registry.
-            client_weights: of some clients, see `relume_worker.fair_share.FairShare`.
+            client_weights: weights of some clients, see `relume_worker.jobs.fair_share.FairShare`.
         """
         get_storage()  # fail early if its address is invalid
         bake_code()  # of the running version: its files may be replaced meanwhile
@@ -75,7 +75,7 @@ class BakeService:
         refuse_unfinished(self.data_dir)
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self._methods = methods
-        self._executors = Executors(scheduler, num_workers)
+        self.executors = Executors(scheduler, num_workers)
         self._blocked_bakes = BlockedBake()
         self._status_bus = StatusBus(self.get)
         self._database_errors = {
@@ -108,7 +108,7 @@ class BakeService:
         self._notify_change()
         for thread in self._threads:
             thread.join(CLOSE_S)
-        self._executors.close()
+        self.executors.close()
         idle_timer.end()
         self._status_bus.close()
         self.ledger.close()
@@ -139,7 +139,7 @@ class BakeService:
             plan = method.plan(scene, recipe)
             disk = estimate_disk(method, scene, recipe, plan)
         plan = replace(plan, disk_bytes=disk.store, scratch_bytes=disk.scratch)
-        processes = 1 if is_tiny(plan) else 0 if self._executors.scheduler else self._executors.num_workers
+        processes = 1 if is_tiny(plan) else 0 if self.executors.scheduler else self.executors.num_workers
         check_budget(plan, self.data_dir, processes)
         return plan
 
@@ -193,7 +193,7 @@ class BakeService:
         Includes starting processes and loading kernels.
         """
         work_s = self._work_s(plan)
-        is_cold = not is_tiny(plan) and not self._executors.has_cluster
+        is_cold = not is_tiny(plan) and not self.executors.has_cluster
         return work_s if work_s is None or not is_cold else work_s + self._start_s
 
     def _work_s(self, plan: Plan) -> float | None:
@@ -202,20 +202,20 @@ class BakeService:
         if (
             is_tiny(plan) or not self._is_crowding.is_set()
         ):  # otherwise a bake that ends before this one would count twice
-            load += self._executors.num_workers
+            load += self.executors.num_workers
         completed = self.ledger.finished_bakes(NUM_REFERENCE_BAKES)
-        return estimate_seconds(plan, completed, self._executors.num_workers, crowding(load))
+        return estimate_seconds(plan, completed, self.executors.num_workers, crowding(load))
 
     def _expect_work(self, status: BakeStatus, parallel: int) -> ExpectedWork:
         method = self._method(status.recipe.method)
-        seconds = self.ledger.stage_seconds(status.scene, method.name, self._executors.num_workers, NUM_REFERENCE_BAKES)
+        seconds = self.ledger.stage_seconds(status.scene, method.name, self.executors.num_workers, NUM_REFERENCE_BAKES)
         total, stages = sum(seconds.values()), range(len(method.stages))
         stage_fractions = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
         return ExpectedWork(self._work_s(status.plan), stage_fractions, parallel)
 
     def workers_resident_bytes(self) -> int:
         """Resident memory of this service's worker processes, in bytes."""
-        return self._executors.resident_bytes()
+        return self.executors.resident_bytes()
 
     def _resolve_scene_id(self, scene_id: str) -> str:
         from relume_worker.scenes import get_scene
@@ -252,7 +252,6 @@ class BakeService:
 
     def _run_lane(self, tiny: bool) -> None:
         """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
-        last_active_s = time.monotonic()
         while not self._closing.is_set():
             try:
                 self._wakes[tiny].clear()
@@ -260,10 +259,9 @@ class BakeService:
                 if has_run or not self._blocked_bakes:  # a bake waiting for its own lease is not blocked by the disk
                     self._database_errors[tiny].report_recovered()
                 if has_run:
-                    last_active_s = time.monotonic()
                     continue
-                if not tiny and time.monotonic() - last_active_s > idle_seconds():
-                    self._executors.stop_cluster()
+                if not tiny:
+                    self.executors.stop_idle_cluster(idle_seconds())
                 self._wakes[tiny].wait(POLL_S)
             except Exception as error:  # the lane must survive an unavailable database
                 self._database_errors[tiny].report_failure(error)
@@ -286,14 +284,14 @@ class BakeService:
 
     def _run(self, status: BakeStatus, tiny: bool) -> None:
         self._status_bus.notify_change()
-        start_s, is_cold = time.monotonic(), not self._executors.has_cluster
+        start_s, is_cold = time.monotonic(), not self.executors.has_cluster
         try:
             method = self._method(status.recipe.method)
-            expected_work = self._expect_work(status, 1 if tiny else self._executors.num_workers)
+            expected_work = self._expect_work(status, 1 if tiny else self.executors.num_workers)
             if not tiny:
                 self.ledger.heartbeat(status.id, self._owner, phase="starting", phase_since=time.time())
                 self._status_bus.notify_change()
-            executor = self._executors.local() if tiny else self._executors.cluster()
+            executor = self.executors.local() if tiny else self.executors.cluster()
         except SQLAlchemyError:  # its lease expires, and it is claimed again
             raise
         except Exception as error:
@@ -302,10 +300,10 @@ class BakeService:
             return
         runner = BakeRunner(
             ledger=self.ledger,
-            job=Job(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
+            bake=BakeInput(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
             owner=self._owner,
             executor=executor,
-            max_in_flight=(lambda: 1) if tiny else (lambda: 2 * self._executors.cluster_threads()),
+            max_in_flight=(lambda: 1) if tiny else (lambda: 2 * self.executors.num_processes()),
             on_change=self._status_bus.notify_change,
             is_stopped=self._closing.is_set,
             expected_work=expected_work,
@@ -315,7 +313,8 @@ class BakeService:
             return
         self._is_crowding.set()
         try:
-            runner.run()
+            with self.executors.keep_cluster():
+                runner.run()
         finally:
             self._is_crowding.clear()
         if is_cold and runner.working_since is not None:

@@ -37,7 +37,7 @@ class BakeStatus:
     Attributes:
         progress: 0 to 1.
         phase: current phase, None if it is not running. phase_since: seconds since 1970.
-        queue_position: bakes before it, if it is queued.
+        queue_position: number of bakes before it, if it is queued.
         rays_per_second, seconds_left: None if nothing has been measured yet.
         bytes: size of the published store, 0 before.
         problem: one sentence with a remedy, or why it has restarted; None if there is no problem.

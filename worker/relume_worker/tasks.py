@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +26,7 @@ CODE_MISMATCH_MESSAGE = "a worker process runs another version of relume than th
 
 
 @dataclass(frozen=True)
-class Job:
+class BakeInput:
     """Input of all tasks of a bake; small, it is sent with every task.
 
     Attributes:
@@ -55,8 +56,19 @@ def _intern_method(method: BakeMethod) -> BakeMethod:
     return _methods.setdefault(pickle.dumps(method), method)
 
 
+_idle_callbacks: list[Callable[[], None]] = []
+
+
+def when_idle(release: Callable[[], None]) -> Callable[[], None]:
+    """Decorate a function that releases something of this process after some time without tasks."""
+    _idle_callbacks.append(release)
+    return release
+
+
 def _release_caches() -> None:
     """Release cached scenes, methods' data and store contents."""
+    for release in _idle_callbacks:
+        release()
     load_registered_scene.cache_clear()
     _methods.clear()
     run_bake.open_stage_reader.cache_clear()
@@ -72,23 +84,23 @@ def cached_bytes() -> int:
     return live_bytes(load_registered_scene, _methods, run_bake.open_stage_reader)
 
 
-def run_task(job: Job, task: Task) -> TaskCost:
+def run_task(bake: BakeInput, task: Task) -> TaskCost:
     """Compute a task and write its shards into the unfinished store; repeating it gives the same bytes.
 
     Raises:
         StoreError: this process runs other code than the submitting one; a store must be made by one version.
     """
-    if job.code != bake_code():
+    if bake.code != bake_code():
         raise StoreError(CODE_MISMATCH_MESSAGE)
     start_s = time.perf_counter()
-    staging = staging_path(job.data_dir, job.bake_id)
+    staging = staging_path(bake.data_dir, bake.bake_id)
     notes = TaskNotes(staging)
     with idle_timer.keep_awake(), notes.watching_compiler():
         notes.note("reading")
-        scene = job.recipe.add_cameras(load_registered_scene(job.data_dir, job.scene_id))
-        method = _intern_method(job.method)
+        scene = bake.recipe.add_cameras(load_registered_scene(bake.data_dir, bake.scene_id))
+        method = _intern_method(bake.method)
         notes.note("building")
         method.prepare(scene)
         notes.note("working")
-        written = run_bake.run_task(method, scene, job.recipe, staging, task)
+        written = run_bake.run_task(method, scene, bake.recipe, staging, task)
     return TaskCost(written.num_rays, written.trace_s, time.perf_counter() - start_s)

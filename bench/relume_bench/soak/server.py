@@ -34,8 +34,8 @@ class Sample:
     """Resources of the server at one moment; `at_s` since the start.
 
     Attributes:
-        memory_bytes: resident bytes of its process. workers: of its child processes.
-        handles: open files and sockets. threads: of its process. disk: bytes in the data directory.
+        memory_bytes: resident bytes of its process. workers: resident bytes of its child processes.
+        handles: open files and sockets. threads: threads of its process. disk: bytes in the data directory.
     """
 
     at_s: float

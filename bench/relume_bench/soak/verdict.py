@@ -18,7 +18,7 @@ class Trend:
     """Trend of one number over a soak test, without its warm-up.
 
     Attributes:
-        early, late: medians of the first and the last third. slope_per_hour: of the regression line.
+        early, late: medians of the first and the last third. slope_per_hour: slope per hour of the regression line.
         error_per_hour: its standard error. allowed: growth that is accepted.
     """
 

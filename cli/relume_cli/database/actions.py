@@ -43,7 +43,7 @@ def find_bakes(service: BakeService, name: str) -> list[BakeStatus]:
     """Return the bake of an id or the start of one, otherwise all bakes of a scene, newest first. Raises NotFoundError.
 
     Args:
-        service: of the data directory. name: as it was typed.
+        service: service of the data directory. name: as it was typed.
     """
     from relume_cli.data_folder import bakes_by_prefix, find_scene
 

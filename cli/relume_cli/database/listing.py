@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -38,9 +37,9 @@ def list_items(
     from relume_cli.database.actions import open_data_folder
 
     if scene is not None and kind != "bakes":
-        raise ParameterError("--scene", scene, f"none: only bakes have a scene, not {kind}")
+        raise ParameterError("--scene", scene, f"no scene, because {kind} have none")
     if state is not None and kind not in ("bakes", "renders"):
-        raise ParameterError("--state", state, f"none: only bakes and renders have a state, not {kind}")
+        raise ParameterError("--state", state, f"no state, because {kind} have none")
     if kind == "built-ins":
         rows = _built_ins()
     elif kind == "bakes":
@@ -134,27 +133,28 @@ def _renders(data_folder: OpenFolder) -> Iterator[Row]:
     """Renders as in the database; only the server knows the progress within a frame."""
     from sqlalchemy import select
 
-    from relume_server.persistence.tables import RenderRow
-    from relume_server.schemas.renders import RenderRequest
+    from relume_server.schemas.renders import RENDER_PLACEHOLDER
+    from relume_worker.database.models import JobRow
+    from relume_worker.jobs.job import read_row
 
     with data_folder.service.ledger.sessions() as session:
-        rows = list(session.scalars(select(RenderRow).order_by(RenderRow.created.desc())))
+        rows = list(session.scalars(select(JobRow).where(JobRow.kind == "render").order_by(JobRow.created.desc())))
     for row in rows:
-        request = RenderRequest.model_validate(json.loads(row.request))
+        request, state, problem = read_row(row, RENDER_PLACEHOLDER)
         document = {
             "id": row.id,
             "bake": request.bake,
             "view": request.view,
             "format": request.format,
             "size": request.size,
-            "state": row.state,
+            "state": state,
             "done": row.done,
             "total": request.num_frames,
-            "problem": row.problem,
+            "problem": problem,
             "created": iso_time(row.created),
         }
         done = f"{row.done} of {request.num_frames} frames"
-        yield document, f"{row.id}  {row.state:9}  {done}  {request.name or request.view}, {request.format}"
+        yield document, f"{row.id}  {state:9}  {done}  {request.name or request.view}, {request.format}"
 
 
 def _built_ins() -> list[Row]:

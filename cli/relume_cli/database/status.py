@@ -79,9 +79,9 @@ def _print_all(data_folder: OpenFolder, *, as_json: bool) -> None:
 def _renders_by_state(data_folder: OpenFolder) -> dict[str, int]:
     from sqlalchemy import func, select
 
-    from relume_server.persistence.tables import RenderRow
+    from relume_worker.database.models import JobRow
 
-    query = select(RenderRow.state, func.count().label("num")).group_by(RenderRow.state)
+    query = select(JobRow.state, func.count().label("num")).where(JobRow.kind == "render").group_by(JobRow.state)
     with data_folder.service.ledger.sessions() as session:
         return {row.state: row.num for row in session.execute(query)}
 

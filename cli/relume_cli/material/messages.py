@@ -16,7 +16,7 @@ def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_j
     """Print a material's name in looks, its terms, and its compression error.
 
     Args:
-        record: of the material. lines: with its error. as_json: whether JSON was asked for.
+        record: record of the material. lines: with its error. as_json: whether JSON was asked for.
     """
     terms = record.terms()
     document = {"id": record.id, "data": record.data, "name": record.name, "terms": terms}

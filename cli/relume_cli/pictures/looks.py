@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import Description, NotFoundError, ParameterError
 from relume_cli.name_lookup import match_name
 from relume_cli.options import read_json
 
@@ -48,7 +48,7 @@ def read_looks(arguments: Sequence[str], look_store: LookStore) -> list[NamedLoo
         NamedLook("default", {})
     ]
     if len(looks) > MAX_LOOKS:
-        raise ParameterError("--look", f"{len(looks)} looks", f"at most {MAX_LOOKS:,}")
+        raise ParameterError("--look", Description(f"a list of {len(looks):,} looks"), f"at most {MAX_LOOKS:,} looks")
     return looks
 
 
@@ -91,7 +91,6 @@ def _by_name(argument: str, look_store: LookStore) -> NamedLook:
     name = match_name(argument, names)
     if name in names:
         return _make_named_look(name, json.loads(look_store.get(name).document), name)
-    saved_names = ", ".join(repr(look_name) for look_name in names[:10]) or "none yet"
-    raise NotFoundError(
-        f"--look is {argument[:80]!r}, which is no file, folder or saved look; saved looks: {saved_names}"
-    )
+    saved_names = ", ".join(repr(look_name) for look_name in names[:10])
+    remedy = f"choose from {saved_names}" if names else "save a look first"
+    raise NotFoundError(f"--look is {argument[:80]!r}, which is no file, folder or saved look; {remedy}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 from relume_cli.pictures.files import FORMATS, check_display_view, check_output
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class PlannedFile(NamedTuple):
     """One image file, or folder of frames.
 
     Attributes:
-        look: name. document: as given, perhaps partial. path: of the file or folder.
+        look: name. document: as given, perhaps partial. path: path of the file or folder.
     """
 
     look: str
@@ -58,7 +58,7 @@ def check_target(output: Path, turntable_plan: TurntablePlan | None, *, resumes:
     suffix = output.suffix.lower()
     if turntable_plan is None:
         if suffix == VIDEO:
-            raise ParameterError("--output", str(output), "the name of an image; a video needs --turntable N")
+            raise ParameterError("--output", str(output), "the name of an image, or --turntable N for a video")
         check_output(output)
         return
     if suffix in NO_FOLDERS:
@@ -89,7 +89,7 @@ def plan_files(looks: Sequence[NamedLook], output: Path, turntable_plan: Turntab
         ParameterError: several looks would be written to one file.
     """
     if len(looks) > 1 and turntable_plan is not None:
-        raise ParameterError("--look", f"{len(looks)} looks", "one look with --turntable")
+        raise ParameterError("--look", Description(f"a list of {len(looks)} looks"), "one look with --turntable")
     if len(looks) > 1 and LOOK not in output.name:
         raise ParameterError(
             "--output", str(output), f"a file name with {LOOK} in it, because there are {len(looks)} looks"
@@ -98,7 +98,7 @@ def plan_files(looks: Sequence[NamedLook], output: Path, turntable_plan: Turntab
     for number, planned_file in enumerate(planned_files):
         if planned_file.path in (earlier.path for earlier in planned_files[:number]):
             raise ParameterError(
-                "--look", planned_file.look, f"looks of different names: two would be written to {planned_file.path}"
+                "--look", planned_file.look, f"looks of different names; two would become {planned_file.path}"
             )
     return planned_files
 

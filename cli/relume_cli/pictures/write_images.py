@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from relume.live.fixed_camera.protocols import OpenBake
+    from relume.live.opened.static_view import StaticViewBuilder
     from relume.look import Look
-    from relume.methods.static_view import StaticViewBuilder
     from relume.scene.model import Camera
     from relume_cli.pictures.files import ExrOptions
     from relume_cli.pictures.plans import PlannedFile, TurntablePlan
@@ -41,7 +41,7 @@ def write_picture(
     """Render the exact image of a look, and write it.
 
     Args:
-        source: a bake. look: complete. path: of the file. exr: options for EXR files.
+        source: a bake. look: complete. path: path of the file. exr: options for EXR files.
         report: called with the fraction done.
     """
     from relume.output.render_image import render_image

@@ -87,9 +87,9 @@ def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: 
     """
     from relume.core.cache import Cache
     from relume.live.fixed_camera.protocols import EditAxis
-    from relume.methods.free_camera_transfer import BakedFreeCamera
-    from relume.methods.registry import open_bake
-    from relume.methods.static_view import StaticViewBuilder
+    from relume.live.opened.free_camera_transfer import BakedFreeCamera
+    from relume.live.opened.openers import open_bake
+    from relume.live.opened.static_view import StaticViewBuilder
     from relume.output.render_image import render_image
     from relume.scene.custom_camera import with_cameras
     from relume_cli.data_folder import complete_look, find_bake, find_scene
@@ -191,7 +191,7 @@ def percent(fraction: float, error: float | None = None) -> str:
     """Format a fraction in percent, with the digits that its standard error justifies.
 
     Args:
-        fraction: of one. error: its standard error; None: two digits.
+        fraction: fraction of one. error: its standard error; None: two digits.
     """
     from math import floor, log10
 

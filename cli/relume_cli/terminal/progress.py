@@ -26,7 +26,7 @@ def report_part(report: ReportProgress, index: int, total: int, detail: str) -> 
     """Return a callback that reports one part of a larger work.
 
     Args:
-        report: of the whole work. index, total: of the part. detail: text for the part.
+        report: report of the whole work. index, total: index and total of the part. detail: text for the part.
     """
     return lambda share: report((index + share) / total, detail)
 
@@ -37,7 +37,7 @@ class ProgressLines:
     def __init__(self, label: str, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
         """
         Args:
-            label: of the work. write: takes a line. clock: seconds.
+            label: label of the work. write: takes a line. clock: seconds.
         """
         self._label, self._write, self._clock = label, write, clock
         self._last_s, self._step = clock(), 0

@@ -17,7 +17,7 @@ function exportTargetLabel(): string {
 interface ExportOption {
   label: string;
   help: string;
-  run(): Promise<void>;
+  run: () => Promise<void>;
 }
 
 const IMAGE_EXPORTS: ExportOption[] = [
@@ -93,7 +93,7 @@ function ColorSpaceSelect() {
 
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
-  displayedFrames.value;
+  void displayedFrames.value;
   const isUnavailable = look.value === null || !stage.active.hasPixels;
   const busy = isUnavailable || exporting.value !== null;
   const onEscape = (event: KeyboardEvent) => {

@@ -143,8 +143,8 @@ function ToneMapSelect({ toneMap }: { toneMap: Look["display"]["tone_map"] }) {
 function HistoryButtons() {
   return (
     <div class="group" role="group" aria-label="History">
-      <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={undo} />
-      <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={redo} />
+      <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={() => void undo()} />
+      <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={() => void redo()} />
     </div>
   );
 }

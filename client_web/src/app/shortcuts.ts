@@ -18,9 +18,9 @@ export interface Shortcut {
   label: string;
   /** `KeyboardEvent.key`, prefixed with "Ctrl+" and "Shift+" if they matter. */
   keys: string[];
-  run(): void;
+  run: () => void;
   /** For keys that act while held. */
-  release?(): void;
+  release?: () => void;
 }
 
 const THIRD_STOP = 1 / 3;
@@ -51,8 +51,8 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Light handles", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
   { group: "Picture", label: "Exposure −⅓ stop", keys: [","], run: () => changeExposure(-THIRD_STOP) },
   { group: "Picture", label: "Exposure +⅓ stop", keys: ["."], run: () => changeExposure(THIRD_STOP) },
-  { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: undo },
-  { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: redo },
+  { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: () => void undo() },
+  { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: () => void redo() },
   { group: "Look", label: "Save look", keys: ["Ctrl+s"], run: () => void saveLook() },
   { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
   { group: "Look", label: "Timeline", keys: ["m"], run: () => (timelineOpen.value = !timelineOpen.value) },

@@ -48,17 +48,17 @@ export function CurveEditor({ info, edits }: { info: CurveBody; edits: CurveEdit
   const model = useMemo(() => curveModel(path, info, edits, shape), [path, info, edits, shape]);
   const ready = model.curves.every((bands) => bands !== null);
   const { frame, context, spot, pointsBlocked, dragging, handlers } = usePlot(model, width, ready);
+  const channels = activeChannels.value;
   useEffect(() => {
     pickedPoint.value = null;
     selectedInterval.value = null;
     return clearBrush;
-  }, [path, activeChannels.value]);
-  const { axes } = frame;
+  }, [path, channels]);
   const first = context.channels[0] ?? 0;
   const handledPoints = curveTool.value === "points" && ready && !pointsBlocked;
   const points = useMemo(
-    () => (handledPoints ? pointsOf(model, first, axes) : null),
-    [handledPoints, model, first, axes.stretched, axes.log, axes.top],
+    () => (handledPoints ? pointsOf(model, first, frame.axes) : null),
+    [handledPoints, model, first, frame.axes],
   );
   const drawn = useMemo(() => model.channels.map((channel) => channel !== null), [model]);
   const contributions = loadContributions(path);

@@ -12,6 +12,7 @@ export function Plot({ frame, ...content }: Props) {
   const { width, height, axes } = frame;
   useLayoutEffect(
     () => paintPlot(canvas.current as HTMLCanvasElement, frame, content),
+    // eslint-disable-next-line react-hooks/exhaustive-deps -- the content's fields are compared one by one
     [width, height, axes.stretched, axes.log, axes.top, ...Object.values(content)],
   );
   return <canvas ref={canvas} aria-hidden="true" style={{ width: `${width}px`, height: `${height}px` }} />;

@@ -24,8 +24,8 @@ export const selectedInterval = signal<[from: number, to: number] | null>(null);
 
 /** The gesture in progress; `model` is always the newest. */
 export interface PlotGesture {
-  move(spot: PlotSpot): void;
-  up(spot: PlotSpot): void;
+  move: (spot: PlotSpot) => void;
+  up: (spot: PlotSpot) => void;
 }
 
 export interface CurveContext {

@@ -1,5 +1,5 @@
 /** Pointer and keyboard input of the plot: position, dragged point, current gesture. */
-import { useRef, useState } from "preact/hooks";
+import { useMemo, useRef, useState } from "preact/hooks";
 import { history } from "../edit/history";
 import { useDrag } from "../ui/drag";
 import { requestBrush, clearBrush } from "./curveBrush";
@@ -65,11 +65,12 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
   const [frozenAxes, setFrozenAxes] = useState<CurveAxes | null>(null);
   const gesture = useRef<PlotGesture | null>(null);
   const [spot, setSpot] = useState<PlotSpot | null>(null);
-  const axes: CurveAxes = frozenAxes ?? {
-    stretched: isStretched(model.info.name, model.info.bands),
-    log: logarithmic.value,
-    top: niceTop(largestValue(model), logarithmic.value),
-  };
+  const log = logarithmic.value;
+  const fittedAxes = useMemo<CurveAxes>(() => {
+    const top = niceTop(largestValue(model), log);
+    return { stretched: isStretched(model.info.name, model.info.bands), log, top };
+  }, [model, log]);
+  const axes = frozenAxes ?? fittedAxes;
   const frame: PlotFrame = { width, height: Math.round(Math.min(460, Math.max(190, width * 0.66))), axes };
   const context: CurveContext = { model, axes, channels: channelsOf(activeChannels.value) };
   const pointsBlocked = curveTool.value === "points" && activeChannels.value === "rgb" && !model.areJoined;
@@ -87,8 +88,9 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
   const move = (event: PointerEvent) => {
     const svg = event.currentTarget as SVGSVGElement;
     setSpot(spotOf(frame, svg, event));
-    const events = curveTool.value === "draw" ? event.getCoalescedEvents?.() : undefined;
-    for (const sample of events?.length ? events : [event]) gesture.current?.move(spotOf(frame, svg, sample));
+    // Safari has them since version 18.2
+    const events = curveTool.value === "draw" && "getCoalescedEvents" in event ? event.getCoalescedEvents() : [];
+    for (const sample of events.length > 0 ? events : [event]) gesture.current?.move(spotOf(frame, svg, sample));
   };
   const hover = (event: PointerEvent) => {
     const hoverSpot = spotOf(frame, event.currentTarget as SVGSVGElement, event);

@@ -21,6 +21,7 @@ export function onLookChange(callback: ChangeListener): void {
 
 /** Time of the input on the clock of performance.now; inside an event handler, the event's own time. */
 function currentInputTime(): number {
+  // eslint-disable-next-line @typescript-eslint/no-deprecated -- otherwise all handlers would hand their events down to here
   const event = window.event;
   return event !== undefined && event.timeStamp > 0 ? event.timeStamp : performance.now();
 }

@@ -41,6 +41,13 @@ function encodeFloats(bytes: Uint8Array): Uint32Array {
   return encoded;
 }
 
+/** The image of a frame whose one tile covers it, without a copy of its pixels; null for other frames. */
+export function wholeImage({ header, payload }: Frame): PixelBuffer | null {
+  const { width, height, tiles, format } = header;
+  const isWhole = tiles.length === 1 && tiles[0]?.[2] === width && tiles[0][3] === height;
+  return isWhole && format === "rgb9e5" ? { width, height, encoded: readRgb9e5(payload) } : null;
+}
+
 /** Write a frame's tiles into the image and return each tile's encoded pixels, ready for upload. */
 export function applyFrame(target: PixelBuffer, frame: Frame): { tile: Tile; encoded: Uint32Array }[] {
   const encoded = frame.header.format === "f32" ? encodeFloats(frame.payload) : readRgb9e5(frame.payload);

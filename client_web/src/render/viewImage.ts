@@ -6,7 +6,7 @@ import type { Fidelity, Rgb } from "../protocol";
 import { brushedRange } from "../state/curvePreview";
 import { materialNames } from "../state/scene";
 import type { PendingFrame } from "./frameArrival";
-import { applyFrame, brushImage, copyPixels, emptyPixels, normalizeWeights, readAlpha, type PixelBuffer } from "./pixels";
+import { applyFrame, brushImage, copyPixels, emptyPixels, normalizeWeights, readAlpha, wholeImage, type PixelBuffer } from "./pixels";
 import type { MaterialIds } from "./png16";
 import type { DisplayRenderer } from "./displayRenderer";
 import type { CanvasGeometry } from "./zoomTransform";
@@ -16,9 +16,9 @@ const BACKGROUND = 65535;
 /** A screen that can show an image. */
 export interface ImagePresenter {
   readonly renderer: DisplayRenderer;
-  present(): Promise<void>;
-  redraw(): void;
-  size(): CanvasGeometry;
+  present: () => Promise<void>;
+  redraw: () => void;
+  size: () => CanvasGeometry;
 }
 
 export class ViewImage {
@@ -78,8 +78,14 @@ export class ViewImage {
   }
 
   private addTiles(frame: Frame): void {
-    const tiles = applyFrame(this.pixels, frame);
     this.setAlpha(readAlpha(this.alpha, frame));
+    const whole = wholeImage(frame);
+    if (whole !== null) {
+      this.pixels = whole;
+      this.screen?.renderer.updateImage(whole);
+      return;
+    }
+    const tiles = applyFrame(this.pixels, frame);
     // one large upload is faster than many small ones
     const area = tiles.reduce((sum, { encoded }) => sum + encoded.length, 0);
     if (area > this.pixels.encoded.length / 2) this.screen?.renderer.updateImage(this.pixels);

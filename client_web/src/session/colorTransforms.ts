@@ -28,7 +28,13 @@ async function fetchLut(config: string, view: OcioView): Promise<void> {
 /** Resolves when the display transform of a look is loaded. */
 export function untilToneMapReady(targetLook: Look): Promise<void> {
   return new Promise((done) => {
-    const stop = effect(() => void (lutFor(targetLook.display.tone_map) !== null && queueMicrotask(() => (stop(), done()))));
+    const stop = effect(() => {
+      if (lutFor(targetLook.display.tone_map) === null) return;
+      queueMicrotask(() => {
+        stop();
+        done();
+      });
+    });
   });
 }
 

@@ -24,7 +24,7 @@ effect(() => {
 
 // the active view may become one that was already complete
 effect(() => {
-  activeViewName.value;
-  shownViews.value;
+  void activeViewName.value;
+  void shownViews.value;
   untracked(() => void swapWhenComplete());
 });

@@ -33,6 +33,12 @@ export class BakeConnection {
   sentRegions = new Map<string, string>();
   /** True if the server knows that this browser draws free-camera views. */
   isRenderingAnnounced = false;
+  /** True if this browser has failed to draw the bake. */
+  isRenderingRejected = false;
+  /** Number of lost graphics contexts of this bake. */
+  numLostContexts = 0;
+  /** Number of each view's camera as last sent to the server: images of earlier cameras are outdated. */
+  readonly cameraSeqs = new Map<string, number>();
 
   constructor(
     readonly bake: string,

@@ -36,8 +36,8 @@ onLookChange((change, inputTime) => {
 });
 
 effect(() => {
-  soloLight.value;
-  pathOverride.value;
+  void soloLight.value;
+  void pathOverride.value;
   const current = look.peek();
   if (current !== null) requestFramesEverywhere(current, performance.now());
 });

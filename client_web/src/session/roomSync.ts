@@ -3,7 +3,7 @@ import { effect } from "@preact/signals";
 import { rebasePatch } from "../state/document/jsonPatch";
 import { previewedStep } from "../edit/edit";
 import { history } from "../edit/history";
-import type { HelloMessage, Look, PatchOp, RoomUpdate } from "../protocol";
+import type { HelloMessage, Look, RoomUpdate } from "../protocol";
 import { connection } from "../state/connection";
 import { look } from "../state/look";
 import { selectedMaterial } from "../state/selection";
@@ -46,7 +46,7 @@ export function joinRoom(bakeConnection: BakeConnection, hello: HelloMessage): b
 export function onRoomUpdate(bakeConnection: BakeConnection, message: RoomUpdate, shared: Look | null): void {
   if (bakeConnection !== connections.shown || shared === null) return;
   const preview = previewedStep.peek();
-  if (preview !== null) previewedStep.value = { ...preview, before: rebasePatch(preview.before, message.patch as PatchOp[]) };
+  if (preview !== null) previewedStep.value = { ...preview, before: rebasePatch(preview.before, message.patch) };
   const ownLook = look.peek();
   look.value = ownLook === null || shared.transport === ownLook.transport ? shared : { ...shared, transport: ownLook.transport };
   updateExactness(bakeConnection);
@@ -68,7 +68,7 @@ function sendPresence(): void {
 }
 
 effect(() => {
-  ownName.value;
-  selectedMaterial.value;
+  void ownName.value;
+  void selectedMaterial.value;
   if (connection.value === "open") sendPresence();
 });

@@ -26,7 +26,7 @@ export function sendRegions(bakeConnection: BakeConnection | null): void {
 }
 
 effect(() => {
-  displayedFrames.value;
+  void displayedFrames.value;
   const timer = setTimeout(() => {
     sendRegions(connections.shown);
     sendRegions(connections.incoming);

@@ -10,8 +10,8 @@ import { ImportWarnings } from "./ImportWarnings";
 
 interface BakeDialogProps {
   scene: SceneBody;
-  onClose(): void;
-  onOpen(choice: BakeSettings): void;
+  onClose: () => void;
+  onOpen: (choice: BakeSettings) => void;
 }
 
 export function BakeDialog({ scene, onClose, onOpen }: BakeDialogProps) {

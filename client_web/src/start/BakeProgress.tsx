@@ -4,7 +4,7 @@ import { subscribeToBake } from "../session/net/bakeEvents";
 import type { BakeBody, SceneBody } from "../protocol";
 import { bakeProgressText, hasProgress, useElapsedSeconds } from "../session/scene/bakeStatus";
 
-export function BakeProgress({ scene, onReady }: { scene: SceneBody; onReady(): void }) {
+export function BakeProgress({ scene, onReady }: { scene: SceneBody; onReady: () => void }) {
   const [bake, setBake] = useState<BakeBody | null>(null);
   const elapsed = useElapsedSeconds(bake);
   const newest = scene.bakes[0];
@@ -14,7 +14,7 @@ export function BakeProgress({ scene, onReady }: { scene: SceneBody; onReady(): 
       setBake(update);
       if (update.state === "ready") onReady();
     });
-  }, [newest]);
+  }, [newest, onReady]);
   return (
     <span class="no-picture">
       {bake === null ? (newest === undefined ? "No preview yet" : "…") : bakeProgressText(bake, elapsed)}

@@ -8,7 +8,7 @@ interface ChosenFilesProps {
   numParts: number;
   /** Import errors by path. */
   problems: ReadonlyMap<string, string>;
-  onLeaveOut(path: string): void;
+  onLeaveOut: (path: string) => void;
 }
 
 const MAX_LISTED_MISSING = 3;

@@ -23,7 +23,7 @@ function usePlan(request: BakeRequest, problem: string | null): BakePlan {
     const timer = setTimeout(() => {
       planBake(JSON.parse(requestText) as BakeRequest).then(
         (dryRun) => !stale && setPlan(dryRun),
-        (error: Error) => !stale && setPlan(error),
+        (error: unknown) => !stale && setPlan(error as Error),
       );
     }, TYPING_DELAY_MS);
     return () => {
@@ -41,7 +41,7 @@ interface RecipeFieldProps {
   placeholder?: string;
   range: { minimum: number; maximum: number };
   step: number;
-  onChange(value: number): void;
+  onChange: (value: number) => void;
 }
 
 function RecipeField({ label, value, placeholder, range, step, onChange }: RecipeFieldProps) {
@@ -68,7 +68,7 @@ interface CustomRecipeProps {
   request: BakeRequest;
   initial: Recipe;
   action: string;
-  onChoose(recipe: Recipe): void;
+  onChoose: (recipe: Recipe) => void;
 }
 
 export function CustomRecipe({ request, initial, action, onChoose }: CustomRecipeProps) {

@@ -33,7 +33,7 @@ function useSortedFiles(files: readonly DroppedFile[]): ImportSelection {
   return selection;
 }
 
-function FileInput({ label, folder, onFiles }: { label: string; folder?: boolean; onFiles(files: DroppedFile[]): void }) {
+function FileInput({ label, folder, onFiles }: { label: string; folder?: boolean; onFiles: (files: DroppedFile[]) => void }) {
   const accept = [...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES, ...COMPANION_SUFFIXES].join(",");
   return (
     <label class="file">
@@ -61,7 +61,7 @@ function UploadStatus({ name, fraction, number, count }: UploadState) {
   );
 }
 
-export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void }) {
+export function DropZone({ onImported }: { onImported: (scenes: SceneBody[]) => void }) {
   const [files, setFiles] = useState<readonly DroppedFile[]>([]);
   const [withGround, setWithGround] = useState(false);
   const { upload, problems, clearProblems, send } = useImport();

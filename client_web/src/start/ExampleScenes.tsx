@@ -8,7 +8,7 @@ import { reportErrors } from "../ui/toasts";
 
 interface ExampleScenesProps {
   /** Open the scene; `choice`: bake settings, unset if it was baked before. */
-  onOpen(scene: SceneBody, choice?: BakeSettings): void;
+  onOpen: (scene: SceneBody, choice?: BakeSettings) => void;
 }
 
 /** Default bake settings of the built-in scenes. */

@@ -35,7 +35,7 @@ function usePlans(scene: string, method: BakeMethod, views: readonly string[], r
     for (const { name } of PRESETS) {
       planBake({ scene, method, preset: name, aspect, views: [...views], relightable }).then(
         (plan) => !stale && setPlans((previous) => ({ ...previous, [name]: plan })),
-        (error: Error) => !stale && setPlans((current) => ({ ...current, [name]: error })),
+        (error: unknown) => !stale && setPlans((current) => ({ ...current, [name]: error as Error })),
       );
     }
     return () => {
@@ -47,7 +47,7 @@ function usePlans(scene: string, method: BakeMethod, views: readonly string[], r
 
 interface MethodPickerProps {
   selected: BakeMethod;
-  onChoose(method: BakeMethod): void;
+  onChoose: (method: BakeMethod) => void;
 }
 
 function MethodPicker({ selected, onChoose }: MethodPickerProps) {
@@ -68,7 +68,7 @@ function MethodPicker({ selected, onChoose }: MethodPickerProps) {
 
 interface RelightableCheckboxProps {
   isRelightable: boolean;
-  onChoose(relightable: boolean): void;
+  onChoose: (relightable: boolean) => void;
 }
 
 function RelightableCheckbox({ isRelightable, onChoose }: RelightableCheckboxProps) {
@@ -91,7 +91,7 @@ interface PresetsProps {
   size?: BakeSize | null;
   /** Initial pose of a new camera; null: the scene's first camera. */
   from?: CameraPose | null;
-  onChoose(choice: BakeSettings): void;
+  onChoose: (choice: BakeSettings) => void;
 }
 
 export function Presets({ scene, method: initialMethod, views, action, size = null, from = null, onChoose }: PresetsProps) {

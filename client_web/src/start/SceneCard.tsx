@@ -8,13 +8,13 @@ import { warningCounts, ImportWarnings } from "./ImportWarnings";
 
 interface SceneCardProps {
   scene: SceneBody;
-  onOpen(): void;
-  onBake(): void;
-  onDelete(): void;
+  onOpen: () => void;
+  onBake: () => void;
+  onDelete: () => void;
   /** Create a copy with a ground plane. */
-  onAddGround(): void;
+  onAddGround: () => void;
   /** Called when the first bake is ready. */
-  onReady(): void;
+  onReady: () => void;
 }
 
 /** The scene's thumbnail; the server renders it on first request, which takes seconds. */

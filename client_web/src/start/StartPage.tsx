@@ -1,5 +1,5 @@
 /** The start page: import, built-in scenes, and the scenes as cards. */
-import { useEffect, useState } from "preact/hooks";
+import { useCallback, useEffect, useState } from "preact/hooks";
 import { addGround, deleteScene, listScenes } from "../session/net/api";
 import type { SceneBody } from "../protocol";
 import type { BakeSettings } from "../session/scene/bakeSettings";
@@ -20,12 +20,12 @@ function openInEditor(scene: SceneBody, choice?: BakeSettings): void {
 export function StartPage() {
   const [scenes, setScenes] = useState<SceneBody[] | null>(null);
   const [sceneToBake, setSceneToBake] = useState<SceneBody | null>(null);
-  const refresh = () => reportErrors(async () => setScenes(await listScenes()));
-  useEffect(() => void refresh(), []);
+  const refresh = useCallback(() => void reportErrors(async () => setScenes(await listScenes())), []);
+  useEffect(refresh, [refresh]);
   const onImported = (importedScene: SceneBody[]) => {
     if (importedScene.length === 1) setSceneToBake(importedScene[0] as SceneBody);
     else showNote(`${importedScene.length} scenes imported.`);
-    void refresh();
+    refresh();
   };
   const confirmDelete = (scene: SceneBody) =>
     showNote(`Delete “${scene.name}” and its bakes? This can't be undone.`, {
@@ -61,7 +61,7 @@ export function StartPage() {
             onBake={() => setSceneToBake(scene)}
             onDelete={() => confirmDelete(scene)}
             onAddGround={() => void createOnGround(scene)}
-            onReady={() => void refresh()}
+            onReady={refresh}
           />
         ))}
       </ul>

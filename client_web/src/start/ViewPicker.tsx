@@ -1,5 +1,5 @@
 /** Selects the views to bake; lists saved cameras, which can be moved and deleted here. */
-import { useEffect, useState } from "preact/hooks";
+import { useCallback, useEffect, useState } from "preact/hooks";
 import { listCameras } from "../viewport/cameras/cameraRequests";
 import { CameraPlacement } from "../viewport/cameras/CameraPlacement";
 import { removeCamera } from "../viewport/cameras/savedCameras";
@@ -15,7 +15,7 @@ interface ViewPickerProps {
   from: CameraPose | null;
   selected: readonly string[];
   /** An updater: cameras may be saved and deleted while the user selects. */
-  onChoose(change: (views: readonly string[]) => string[]): void;
+  onChoose: (change: (views: readonly string[]) => string[]) => void;
 }
 
 interface CameraPlacementState {
@@ -30,12 +30,12 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
   const sortByScene = (names: readonly string[], sceneViews: readonly SceneView[]) =>
     sceneViews.map((view) => view.name).filter((name) => names.includes(name));
 
-  const reloadViews = async () => {
+  const reloadViews = useCallback(async () => {
     const sceneViews = (await getScene(scene.id)).views;
     setViews(sceneViews);
     return sceneViews;
-  };
-  useEffect(() => void reportErrors(reloadViews), [scene.id]); // cameras may have changed since the scene was listed
+  }, [scene.id]);
+  useEffect(() => void reportErrors(reloadViews), [reloadViews]); // cameras may have changed since the scene was listed
   const toggle = (name: string) =>
     onChoose((isSelected) => sortByScene(isSelected.includes(name) ? isSelected.filter((each) => each !== name) : [...isSelected, name], views));
   const onCameraSaved = async (name: string) => {

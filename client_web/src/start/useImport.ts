@@ -24,9 +24,9 @@ interface SceneImport {
   upload: UploadState | null;
   /** Import errors by path. */
   problems: ReadonlyMap<string, string>;
-  clearProblems(): void;
+  clearProblems: () => void;
   /** Import scenes sequentially; show errors. */
-  send(selection: ImportSelection, ground: boolean): Promise<ImportOutcome>;
+  send: (selection: ImportSelection, ground: boolean) => Promise<ImportOutcome>;
 }
 
 function showRejected(problems: ReadonlyMap<string, string>, numSent: number): void {

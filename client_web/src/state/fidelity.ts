@@ -1,6 +1,6 @@
 /** Fidelity of the shown images. */
 import { effect, signal } from "@preact/signals";
-import type { Fidelity, HelloMessage } from "../protocol";
+import { FIDELITIES, type Fidelity, type HelloMessage } from "../protocol";
 
 /** True if every shown image is exact. */
 export const isFrameExact = signal(false);
@@ -16,11 +16,8 @@ export const freeCameraError = signal<number | null>(null);
 /** The error measured during the bake, in the scene's own look; null if unknown. */
 export const bakedFreeCameraError = signal<HelloMessage["free_camera_error"]>(null);
 
-/** Fidelity levels, lowest first. */
-const FIDELITY_ORDER: Fidelity[] = ["preview", "approximate", "incremental", "near_exact", "exact"];
-
 export function worstFidelity(fidelities: Fidelity[]): Fidelity {
-  return FIDELITY_ORDER[Math.min(...fidelities.map((each) => FIDELITY_ORDER.indexOf(each)), FIDELITY_ORDER.length - 1)] as Fidelity;
+  return FIDELITIES[Math.min(...fidelities.map((each) => FIDELITIES.indexOf(each)), FIDELITIES.length - 1)] as Fidelity;
 }
 
 const CONVERGED_AFTER_MS = 250;

@@ -59,10 +59,12 @@ function publishLatency(ms: number, now: number): void {
 /** A frame of this revision is on the active view's canvas. */
 export function recordFrameShown(revision: number): void {
   const drawnTime = performance.now();
+  let newest: number | null = null;
   while (waiting[0] !== undefined && waiting[0].revision <= revision) {
     const { revision: sent, inputTime } = waiting.shift() as { revision: number; inputTime: number };
+    newest = inputTime;
     latencies.push({ revision: sent, inputTime, drawnTime });
     if (latencies.length > MAX_RECORDS) latencies.shift();
-    if (waiting[0] === undefined || waiting[0].revision > revision) publishLatency(drawnTime - inputTime, drawnTime);
   }
+  if (newest !== null) publishLatency(drawnTime - newest, drawnTime);
 }

@@ -10,9 +10,9 @@ export function saveInTab(key: string, value: unknown): void {
 }
 
 /** Null if nothing was stored. */
-export function loadFromTab<T>(key: string): T | null {
+export function loadFromTab(key: string): unknown {
   try {
-    return JSON.parse(sessionStorage.getItem(key) ?? "null") as T | null;
+    return JSON.parse(sessionStorage.getItem(key) ?? "null") as unknown;
   } catch {
     return null;
   }

@@ -8,7 +8,7 @@ export const thumbnailRevision = signal(0);
 
 /** A look's thumbnail as data URL; null without one. */
 export function lookThumbnail(thumbnailLook: Look | undefined): string | null {
-  thumbnailRevision.value;
+  void thumbnailRevision.value;
   return thumbnailLook === undefined ? null : (lookThumbnails.get(thumbnailLook) ?? null);
 }
 

@@ -11,7 +11,7 @@ export interface ColorProps {
   initial: Rgb | null;
   /** True for a quantity: the picker changes its hue and keeps its magnitude; else a reflectance. */
   quantity?: boolean;
-  onChange(value: Rgb): void;
+  onChange: (value: Rgb) => void;
 }
 
 const CHANNELS = ["red", "green", "blue"] as const;

@@ -8,8 +8,8 @@ interface Props {
   maximum: number;
   /** Open with the name selected, for new objects. */
   editing?: boolean;
-  onRename(name: string): void;
-  onDone?(): void;
+  onRename: (name: string) => void;
+  onDone?: () => void;
 }
 
 export function EditableName({ name, class: className, maximum, editing = false, onRename, onDone }: Props) {

@@ -10,7 +10,7 @@ interface IconButtonProps {
   /** For a button that opens something: whether it is open. */
   expanded?: boolean;
   disabled?: boolean;
-  onClick(): void;
+  onClick: () => void;
   children?: ComponentChildren;
 }
 

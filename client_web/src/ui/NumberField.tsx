@@ -15,9 +15,9 @@ interface Props {
   autoFocus?: boolean;
   /** Text typed before the field opened. */
   initialText?: string;
-  onChange(value: number): void;
+  onChange: (value: number) => void;
   /** Called when the field is left; `isKeyboard`: by Enter or Escape, so that the focus can move on. */
-  onDone?(isKeyboard: boolean): void;
+  onDone?: (isKeyboard: boolean) => void;
 }
 
 export function NumberField({ value, label, minimum, maximum, step, isInteger = false, autoFocus, initialText, onChange, onDone }: Props) {
@@ -30,7 +30,7 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
     if (!autoFocus) return;
     input.current?.focus();
     if (initialText === undefined) input.current?.select();
-  }, [autoFocus]);
+  }, [autoFocus, initialText]);
 
   const displayedText = isInteger ? String(Math.round(value)) : formatNumber(value);
   const setValue = (next: number) => onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));

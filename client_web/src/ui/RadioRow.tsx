@@ -11,7 +11,7 @@ interface Props<T> {
   label: string;
   choices: readonly RadioOption<T>[];
   selected: T;
-  onSelect(value: T): void;
+  onSelect: (value: T) => void;
 }
 
 export function RadioRow<T extends string>({ label, choices, selected, onSelect }: Props<T>) {

@@ -11,9 +11,9 @@ export interface SliderProps extends NumberRange {
   unit?: string;
   initial?: number;
   tint?: string;
-  onChange(value: number): void;
+  onChange: (value: number) => void;
   /** Called when a drag starts, before the slider moves. */
-  onHold?(): void;
+  onHold?: () => void;
 }
 
 const FINE = 0.1;

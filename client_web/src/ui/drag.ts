@@ -7,13 +7,13 @@ type DragTarget = PointerEvent & { readonly currentTarget: Element };
 
 interface DragHandlers {
   /** The pointer went down; return false to ignore it. */
-  begin(event: DragTarget): boolean | void;
+  begin: ((event: DragTarget) => boolean) | ((event: DragTarget) => void);
   /** It moved while pressed. */
-  move?(event: DragTarget): void;
+  move?: (event: DragTarget) => void;
   /** It moved while not pressed. */
-  hover?(event: DragTarget): void;
+  hover?: (event: DragTarget) => void;
   /** The drag ended; `released`: the pointer was released, not lost. */
-  end?(event: DragTarget, released: boolean): void;
+  end?: (event: DragTarget, released: boolean) => void;
 }
 
 /** Prevents native dragging of selected text or images, which would cancel the pointer. */

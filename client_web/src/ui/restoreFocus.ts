@@ -68,5 +68,5 @@ export function useReturnFocus(panel: { current: HTMLElement | null }, toPage = 
       previousFocus.focus();
       if (previousFocus === document.body && toPage) focusPath = [];
     };
-  }, []);
+  }, [panel, toPage]);
 }

@@ -12,7 +12,7 @@ interface Toast {
   kind: "note" | "error";
   text: string;
   topic?: ToastTopic;
-  action?: { label: string; run(): void };
+  action?: { label: string; run: () => void };
 }
 
 const toasts = signal<Toast[]>([]);

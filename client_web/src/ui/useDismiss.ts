@@ -10,5 +10,5 @@ export function useDismiss(open: boolean, menu: { current: HTMLElement | null },
     };
     window.addEventListener("pointerdown", press, { capture: true });
     return () => window.removeEventListener("pointerdown", press, { capture: true });
-  }, [open]);
+  }, [open, menu, close]);
 }

@@ -38,7 +38,7 @@ function busyMessage(view: string, elapsed: number): BusyMessage {
 }
 
 export function BusyOverlay({ image }: { image: ViewImage }) {
-  displayedFrames.value;
+  void displayedFrames.value;
   const elapsed = useElapsedSeconds(pendingBake.value);
   if (image.hasPixels) return null;
   const { text, announced, progress } = busyMessage(image.view, elapsed);

@@ -7,7 +7,6 @@ import { displayedFrames } from "../state/display";
 import { isFrameExact } from "../state/fidelity";
 import { exposure } from "../state/look";
 import { histogramOpen } from "../state/panels";
-import { activeViewName } from "../state/views";
 
 const WIDTH = 252;
 const HEIGHT = 84;
@@ -73,10 +72,12 @@ function useHistogram(): { histogram: Histogram; isExact: boolean } | null {
     const timer = setTimeout(() => setIdleFrame(frame), IDLE_MS);
     return () => clearTimeout(timer);
   }, [frame]);
+  void bake.value; // another scene may have a view of the same name
+  const [image, stops, isExact] = [stage.active, exposure.value, isFrameExact.value];
   return useMemo(() => {
-    const { hasPixels, pixels } = stage.active;
-    return idleFrame < 0 || !hasPixels ? null : { histogram: computeHistogram(pixels.encoded, exposure.value), isExact: isFrameExact.value };
-  }, [idleFrame, isFrameExact.value, exposure.value, bake.value, activeViewName.value]);
+    const { hasPixels, pixels } = image;
+    return idleFrame < 0 || !hasPixels ? null : { histogram: computeHistogram(pixels.encoded, stops), isExact };
+  }, [idleFrame, image, stops, isExact]);
 }
 
 function HistogramBars() {

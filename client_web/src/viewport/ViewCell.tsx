@@ -13,7 +13,6 @@ import { ImageCanvas } from "../render/canvas";
 import { stage } from "../render/renderStage";
 import { zoomAt } from "../render/zoomTransform";
 import { setTransform, transformOf } from "../render/viewTransforms";
-import type { Triple } from "../protocol";
 import { wipe } from "../state/display";
 import { scene } from "../state/scene";
 import { showSingleView, sideBySide, activeViewName, views, setFocus } from "../state/views";
@@ -62,11 +61,13 @@ function connectScreen(screen: ImageCanvas): () => void {
 /** The screen of a mounted canvas; it shows the image of `view`. */
 function useScreen(view: string) {
   const canvas = useRef<HTMLCanvasElement>(null);
+  const image = stage.imageOf(view);
+  const firstImage = useRef(image);
   const [screen, setScreen] = useState<ImageCanvas | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
     try {
-      const createdScreen = new ImageCanvas(canvas.current as HTMLCanvasElement, stage.imageOf(view));
+      const createdScreen = new ImageCanvas(canvas.current as HTMLCanvasElement, firstImage.current);
       setScreen(createdScreen);
       return connectScreen(createdScreen);
     } catch (error) {
@@ -75,7 +76,6 @@ function useScreen(view: string) {
       return undefined;
     }
   }, []);
-  const image = stage.imageOf(view);
   useEffect(() => {
     if (screen !== null && screen.image !== image) screen.setImage(image);
   }, [screen, image]);
@@ -88,7 +88,7 @@ async function onDoubleClick(screen: ImageCanvas, view: string, event: MouseEven
   if (sideBySide.peek() || freeCamera === null) return sideBySide.peek() ? showSingleView(view) : undefined;
   const { px, py } = pickMaterial(screen, event);
   const { position } = await requestPixelProbe(view, px, py);
-  if (position !== null) freeCamera.lookAt(position as Triple);
+  if (position !== null) freeCamera.lookAt(position);
 }
 
 function onViewKey(screen: ImageCanvas, event: KeyboardEvent): void {
@@ -123,7 +123,7 @@ function ViewName({ view }: { view: string }) {
 }
 
 export function ViewCell({ view }: { view: string }) {
-  scene.value; // another scene may have a view of the same name
+  void scene.value; // another scene may have a view of the same name
   const { canvas, screen, failure } = useScreen(view);
   const pointer = useViewPointer(screen, view);
   const isGrid = sideBySide.value;

@@ -12,7 +12,7 @@ import { shownPanels, togglePanel } from "../state/panelWidths";
 import { formatNumber } from "../ui/scale";
 
 function PixelProbe() {
-  displayedFrames.value;
+  void displayedFrames.value;
   const probed = pixelProbe.value;
   const image = probed === null ? null : stage.imageOf(probed.view);
   const radiance = probed === null ? null : (image?.radiance(probed.x, probed.y) ?? null);
@@ -41,7 +41,7 @@ function PixelProbe() {
 }
 
 export function ViewportBar() {
-  displayedFrames.value;
+  void displayedFrames.value;
   return (
     <div class="picture-bar">
       <PixelProbe />

@@ -13,7 +13,7 @@ function setWipe(position: number): void {
 }
 
 export function WipeHandle({ screen }: { screen: ImageCanvas }) {
-  displayedFrames.value;
+  void displayedFrames.value;
   const size = screen.size();
   const { position } = wipe.value;
   const transform = transformOf(screen.image.view);

@@ -46,6 +46,6 @@ export function clearProbe(): void {
 
 // the contributions change with the image
 effect(() => {
-  displayedFrames.value;
+  void displayedFrames.value;
   if (pixelProbe.peek() !== null && performance.now() - lastRequest > 4 * EVERY_MS) scheduleProbe();
 });

@@ -32,7 +32,8 @@ def pack(rows: Shaped[I8, "n columns"], bits: Shaped[U8, " columns"]) -> Shaped[
     """Pack rows into `packed_bytes` bytes.
 
     Args:
-        rows: from −`max_code` of the column's bits to `max_code` + 1. bits: of each column, 1 to 8.
+        rows: values from −`max_code` of the column's bits to `max_code` + 1.
+        bits: bits per value of each column, 1 to 8.
     """
     shifted = (rows + max_code(bits)).astype(np.uint8)
     columns = [np.unpackbits(column[:, None], axis=1)[:, 8 - b :] for column, b in zip(shifted.T, bits, strict=True)]
@@ -64,7 +65,7 @@ def unpack(data: Shaped[U8, " bytes"], bits: Shaped[U8, " columns"], num: int) -
     """Invert `pack`.
 
     Args:
-        data: result of `pack`. bits: as there. num: number of rows.
+        data: result of `pack`. bits: as in `pack`. num: number of rows.
     """
     out = np.empty((num, len(bits)), np.int8)
     _unpack_kernel(data, bits, out)

@@ -54,7 +54,7 @@ class BonnContainer(NamedTuple):
     Attributes:
         has_cosine: values include the light's cosine.
         views, lights: θ and φ, radians.
-        size: height and width, texels. model: of its colors. channels: three.
+        size: height and width, texels. model: color model of the file. channels: three.
     """
 
     has_cosine: bool
@@ -117,7 +117,7 @@ def read_container(path: Path) -> BonnContainer:
     """Read the header of a file, and memory-map its matrices.
 
     Args:
-        path: of the file.
+        path: path of the file.
     Raises:
         MaterialError: it is another kind of container, damaged, or too large.
     """

@@ -42,9 +42,9 @@ class ZippedBtf:
     """The images of a zip; implements `relume.assets.btf.compress.ViewArrays` without a cache.
 
     Args:
-        path: of the file.
+        path: path of the file.
     Raises:
-        MaterialError: it is no such file, or images are missing, duplicate, or of different sizes.
+        MaterialError: the file is not a zip of such images; or images are missing, duplicate, or of different sizes.
     """
 
     def __init__(self, path: Path) -> None:

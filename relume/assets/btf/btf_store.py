@@ -41,8 +41,9 @@ class BtfRecord:
     Attributes:
         created: seconds since 1970.
         synthetic: name of the geometry; None for a measured BTF.
-        size: height and width, texels. directions: of light, the same number as of view.
-        clusters, components: of the compression. error: relative RMS by the number of components, from zero.
+        size: height and width, texels. directions: directions of light, the same number as of view.
+        clusters, components: number of clusters and of components per view.
+        error: relative RMS by the number of components, from zero.
         ratio: bytes of the measurement, one per channel, over compressed bytes.
     """
 
@@ -63,7 +64,7 @@ class BtfRecord:
         return STORE.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """Its terms in a look; they use no texture of the scene."""
+        """Terms of the BTF in a look; they use no texture of the scene."""
         return [{"model": "measured_btf", "data": self.data, "texture": None}]
 
 
@@ -73,7 +74,7 @@ def store_btf(
     """Store a BTF under the hash of its source; an existing one gets the new name.
 
     Args:
-        folder: of the asset store. source: the imported file, or a description of the synthesis.
+        folder: folder of the asset store. source: the imported file, or a description of the synthesis.
         name: shown to users. synthetic: name of the geometry; None for a measured BTF.
         compute: reads or renders, and compresses; not called if the BTF exists.
     Raises:

@@ -62,7 +62,7 @@ class _Span(NamedTuple):
 
 
 class _PcaChoice(NamedTuple):
-    """clusters, components: of each view. bits: of each component's weights. (components,) uint8"""
+    """Numbers of clusters and components per view, and bits of each component's weights. bits: (components,) uint8"""
 
     clusters: int
     components: int
@@ -164,7 +164,7 @@ def _view_rows(images: ViewArrays, view: int) -> F32:
     """Values of all texels from one view direction. (texels, lights · 3)"""
     values = images.get_view(view)
     if not np.isfinite(values).all() or values.min() < 0:
-        raise MaterialError("the BTF has negative or non-finite values")
+        raise MaterialError("the BTF has negative or non-finite values; check its images")
     return np.ascontiguousarray(values.transpose(1, 0, 2)).reshape(values.shape[1], -1)
 
 
@@ -183,7 +183,7 @@ def _energy(rows: F32) -> float:
 
 
 def _choose_pca(spans: list[_Span], bound: float) -> _PcaChoice:
-    """Minimize the size within the error bound, or else the error; and add some components."""
+    """Choose the smallest size within the error bound, else the smallest error; then add some components."""
     best: tuple[tuple[float, ...], _PcaChoice] | None = None
     texels, values = len(spans[0].z), spans[0].basis.shape[1]
     energy = max(sum(span.energy for span in spans), 1e-30)
@@ -225,7 +225,7 @@ def _allocate_bits(residual: F64, last: int) -> NDArray[np.uint8]:
 
 
 def _compress_view(read_rows: Callable[[], F32], size: tuple[int, int], choice: _PcaChoice, view: int) -> Arrays:
-    """Cluster and quantize the texels of one view: a `_CompressedView`."""
+    """Cluster and quantize the texels of one view."""
     rows, rng = read_rows(), np.random.default_rng((_SEED, view))
     span = _span(rows)
     num, max_steps = choice.components, max_code(choice.bits)
@@ -322,7 +322,7 @@ def build_mip_levels(
     """Average blocks of 2 × 2 texels repeatedly, down to one texel.
 
     Args:
-        z: of the finest level, row by row. size: height and width.
+        z: coordinates of the finest level's texels in the span, row by row. size: height and width.
     Returns:
         All levels, the finest first.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -27,14 +27,14 @@ F64 = NDArray[np.float64]
 UBO_81 = ((0.0, 1), (15.0, 6), (30.0, 12), (45.0, 18), (60.0, 20), (75.0, 24))
 """θ in degrees and number of directions of each ring in the Bonn measurements, φ from 0 (Sattler 2003)."""
 MAX_DIRECTIONS = 400
-_MIN_RING_DIRECTIONS = 4  # of all rings except the first, for interpolation
+_MIN_RING_DIRECTIONS = 4  # directions on each ring except the first, for interpolation
 
 
 class DirectionGrid(NamedTuple):
     """Rings of directions, indexed from the pole outward and by ascending φ.
 
     Attributes:
-        theta: of each ring, ascending from 0, radians.
+        theta: θ of each ring, ascending from 0, radians.
         first: index of the first direction of each ring, then the number of directions.
         shift: φ of the first direction of each ring, in steps between its directions, [0, 1).
     """
@@ -53,7 +53,8 @@ def make_direction_grid(theta_and_counts: Sequence[tuple[float, int]], shift: Se
     """Make a grid from θ in degrees and the number of directions of each ring.
 
     Args:
-        theta_and_counts: of each ring. shift: as in `DirectionGrid`; by default zero.
+        theta_and_counts: θ in degrees and number of directions of each ring.
+        shift: as in `DirectionGrid`; by default zero.
     Raises:
         MaterialError: the first ring is not the pole, θ does not ascend, or there are too few or too many directions.
     """
@@ -98,19 +99,19 @@ def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # t
     """Same as `interpolation_weights`, for angles.
 
     Args:
-        grid, index, weight: as there. theta: radians, up to π/2. azimuth_fraction: φ / 2π.
+        grid, index, weight: as in `interpolation_weights`. theta: radians, up to π/2. azimuth_fraction: φ / 2π.
     """
     lower = 0
     while lower < grid.theta.shape[0] - 2 and theta >= grid.theta[lower + 1]:
         lower += 1
-    theta_fraction: Any = (theta - grid.theta[lower]) / (grid.theta[lower + 1] - grid.theta[lower])
+    theta_fraction = (theta - grid.theta[lower]) / (grid.theta[lower + 1] - grid.theta[lower])
     theta_fraction = np.float32(min(max(theta_fraction, np.float32(0)), np.float32(1)))
     for k in range(2):
         first, count = grid.first[lower + k], grid.first[lower + k + 1] - grid.first[lower + k]
         position = np.float32(azimuth_fraction * count - grid.shift[lower + k])
         if position < 0:
             position += np.float32(count)
-        lower_index: Any = min(np.int64(position), count - 1)
+        lower_index = min(np.int64(position), count - 1)
         phi_fraction = np.float32(position - lower_index)
         ring_weight = theta_fraction if k == 1 else np.float32(1) - theta_fraction
         index[2 * k], index[2 * k + 1] = (

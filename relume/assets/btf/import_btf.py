@@ -29,13 +29,13 @@ def import_btf(
     """Import a zip of images or a .btf container; equal files are the same BTF.
 
     Args:
-        folder: of the asset store. file: of either kind. name: shown to users.
+        folder: folder of the asset store. file: file of either kind. name: shown to users.
         bound: allowed relative RMS error. progress: called with the completed fraction. is_canceled: checked regularly.
         partial_folder: folder of partial results; by default in `folder`, named by the file's content.
-        images: of the file, if the caller reads it.
+        images: images of the file, if the caller reads it.
     Raises:
-        MaterialError: it is no such file, or the store is full. CancelledError: `is_canceled` is true; partial results
-            stay.
+        MaterialError: the file is of neither kind, or the store is full. CancelledError: `is_canceled` is true; partial
+            results stay.
     """
     images = images or open_images(file)
     partial_folder = partial_folder or folder / "making" / STORE.content_id(file)

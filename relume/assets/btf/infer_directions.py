@@ -12,7 +12,7 @@ from relume.core.errors import MaterialError
 F64 = NDArray[np.float64]
 
 _MIN_RING_DISTANCE = 0.5  # degrees of θ between rings
-_MAX_DEVIATION = 1.5  # degrees from a direction to its place in the grid: names have whole degrees
+_MAX_DEVIATION = 1.5  # degrees from a direction to its grid direction: names have whole degrees
 _MIN_SHIFT = 1e-3  # of a step; smaller shifts are rounded to zero
 
 
@@ -22,9 +22,9 @@ def infer_rings(
     """Fit rings about the normal to directions; each ring may start at its own φ.
 
     Args:
-        theta, phi: of each direction, degrees.
+        theta, phi: θ and φ of each direction, degrees.
     Returns:
-        The grid; for each of its directions, the index of the given one.
+        The grid; and for each of its directions, the index into `theta` and `phi`.
     Raises:
         MaterialError: directions are not above the horizon, too many, or not uniformly on rings.
     """

@@ -1,11 +1,11 @@
-"""A compressed BTF: from each side, means and eigenvectors of clusters of texels, and each texel's weights.
+"""A compressed BTF: for each view direction, cluster means and eigenvectors, and a cluster and weights per texel.
 
     B_x(v, l) ≈ M_vk(l) + Σ_j α_vj(x) E_vkj(l),   k = k_v(x)
 
 Local PCA for each view direction, with eigenvectors over the light. Müller 2004, section 3, clusters whole BRDFs
 instead: one cluster and one weight vector per texel for all views. Relief moves across texels from one view to the
-next, and clusters per view follow it (docs/btf.md#equations). Values are radiance toward v for light of unit irradiance
-across its direction l, with the cosine.
+next, and clusters per view follow it (docs/btf.md#equations). Values are radiance toward v per unit irradiance
+perpendicular to l; the cosine is included.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ class LocalPcaBtf:
     """A compressed BTF with V view and L light directions, in K clusters with C components for each view.
 
     Attributes:
-        grid: of both directions.
+        grid: grid of the view and the light directions.
         levels: first texel, height and width of each mip level.
-        cluster: of each texel of each level.
-        weight: α, in units that `step` includes.
-        bits: for the weights of each component, with sign.
-        mean: M.
-        eigen: E, in units of `step`.
+        cluster: cluster index of each texel of each level.
+        weight: weights α, in units of `step`.
+        bits: bits per weight of each component, including the sign.
+        mean: cluster means M.
+        eigen: eigenvectors E, in units of `step`.
         step: quantization step of the product of weight and eigenvector.
-        average: over all texels.
-        height: of the relief above the plane, in side lengths of the texture; one zero if unknown.
-        error: relative RMS of the texels by the number of components, from zero to C.
+        average: mean of all texels.
+        height: height of the relief above the plane, in side lengths of the texture; one zero if unknown.
+        error: relative RMS error of the texels by the number of components, from zero to C.
     """
 
     grid: DirectionGrid
@@ -72,7 +72,7 @@ class LocalPcaBtf:
 
     @property
     def num_bytes(self) -> int:
-        """Compressed size, without the coarser levels, which measurements lack, too."""
+        """Compressed size without mip levels, which the measured data do not have either."""
         bits = np.append(self.bits, np.uint8(cluster_bits(self.mean.shape[1])))
         texel_bytes = packed_bytes(self.size[0] * self.size[1], bits)
         tables = self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
@@ -105,10 +105,10 @@ class LocalPcaBtf:
     def evaluate(
         self, view: int, texels: Shaped[NDArray[np.int64], " n"], texel_weights: Shaped[F64, " n"]
     ) -> Shaped[F64, "L 3"]:
-        """Weighted sum of texels for one view direction: the BRDF times cosine.
+        """Weighted sum of texels for one view direction: BRDF · cosine for each light direction.
 
         Args:
-            view: index of the view direction. texels: indices. texel_weights: of each.
+            view: index of the view direction. texels: indices of the texels. texel_weights: weight of each texel.
         """
         cluster_index, total = self.cluster[view, texels], np.zeros(self.mean.shape[2:])
         for k in np.unique(cluster_index):
@@ -119,7 +119,7 @@ class LocalPcaBtf:
         return total
 
     def texel_brdf(self, texel_index: int) -> Shaped[F64, "V L 3"]:
-        """The BRDF times cosine of a texel."""
+        """BRDF · cosine of a texel for all pairs of directions."""
         all_views = np.arange(self.grid.num_directions)
         k = self.cluster[:, texel_index]
         weight = self.weight[:, texel_index].astype(np.float64) * self.step[all_views, k]

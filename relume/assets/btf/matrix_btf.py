@@ -27,9 +27,9 @@ class MatrixBtf:
     """The values of a .btf file; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        path: of the file.
+        path: path of the file.
     Raises:
-        MaterialError: it is no such file, damaged, too large, or its directions are not rings.
+        MaterialError: the file is of another kind, damaged or too large, or its directions are not rings.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,7 +54,7 @@ class MatrixBtf:
         """Values of all texels from one view direction; negative products are clamped to zero.
 
         Raises:
-            MaterialError: some are not finite.
+            MaterialError: values are not finite.
         """
         pairs = self._views[view] * len(self._lights) + self._lights
         out = np.empty((len(pairs), self.size[0] * self.size[1], 3), np.float32)

@@ -46,7 +46,7 @@ def mean_brdf(
     """The mean BRDF, 1/sr, without the cosine that a BTF's values include.
 
     Args:
-        grid: of the directions. average: `LocalPcaBtf.average`. rotation: of the texture, radians.
+        grid: grid of the directions. average: `LocalPcaBtf.average`. rotation: rotation of the texture, radians.
         directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
     Returns:
         In the type of the directions; zero at and below the horizon.

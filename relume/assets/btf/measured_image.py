@@ -31,7 +31,7 @@ def read_photograph(data: bytes, name: str) -> Shaped[F32, "height width 3"]:
     """Decode a JPEG or PNG with 8-bit sRGB channels, or an OpenEXR file, which is linear.
 
     Args:
-        data: of the file. name: in messages.
+        data: contents of the file. name: name in messages.
     Returns:
         Finite values from 0 to `relume.assets.btf.value_cache.MAX_VALUE`.
     Raises:

@@ -1,4 +1,4 @@
-"""Outgoing radiance of BTF-textured points, for the reference. Tests compare it with plain NumPy."""
+"""Outgoing radiance of points with a BTF, used by the reference; tested against plain NumPy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used
 
     Args:
         size: height and width. u, v: the position, in texels from the center of the first. position_weight: its weight.
-        cluster, weight: of the texels. cluster_slot: row of `factors` for each cluster, negative if it has none yet.
+        cluster, weight: cluster indices and weights of the texels.
+        cluster_slot: row of `factors` for each cluster, negative if it has none yet.
         used_clusters: clusters with a row; the last entry is their number.
     """
     left, upper = math.floor(u), math.floor(v)
@@ -45,7 +46,7 @@ def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texel_positions, wo, out):  # type: ignore[no-untyped-def]
-    """Kernel of `sample_btf`. shears: of the directions. size: height and width in texels."""
+    """Kernel of `sample_btf`. shears: parallax shear of each grid direction. size: height and width, texels."""
     lowest, highest = height.min(), height.max()
     view, view_weight = np.empty(4, np.int32), np.empty(4, np.float32)
     cluster_slot, used_clusters = np.full(256, -1, np.int64), np.empty(4 * texel_positions.shape[1] + 1, np.int64)
@@ -64,8 +65,8 @@ def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texe
         for tap in range(4):
             if view_weight[tap] == 0:
                 continue
-            side_index, used_clusters[-1] = view[tap], 0
-            sx, sy = shear[0] - shears[side_index, 0], shear[1] - shears[side_index, 1]
+            view_index, used_clusters[-1] = view[tap], 0
+            sx, sy = shear[0] - shears[view_index, 0], shear[1] - shears[view_index, 1]
             for k in range(len(heights)):
                 u, v = (
                     texel_positions[p, k, 0] + heights[k] * sx * width,
@@ -76,14 +77,14 @@ def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texe
                     u,
                     v,
                     view_weight[tap] / len(heights),
-                    cluster[side_index],
-                    weight[side_index],
+                    cluster[view_index],
+                    weight[view_index],
                     cluster_slot,
                     used_clusters,
                     factors,
                 )
             for row in range(used_clusters[-1]):
-                table = tables[side_index, used_clusters[row]]
+                table = tables[view_index, used_clusters[row]]
                 cluster_slot[used_clusters[row]] = -1
                 for j in range(table.shape[0]):
                     factor = factors[row, j]
@@ -141,8 +142,8 @@ def outgoing_radiance(
 
     Args:
         btf: the BTF. values_by_light: from `sample_btf`.
-        axes: of the texture, in the frames of the points.
-        point_index: point of each direction. wi: in the frames of their points, unit.
+        axes: axes of the texture, in the frames of the points.
+        point_index: point of each direction. wi: unit directions in the frames of their points.
     Returns:
         Radiance per unit of irradiance perpendicular to `wi`, including the cosine.
     """

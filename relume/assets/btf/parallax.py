@@ -1,6 +1,6 @@
 """Parallax between view directions of a BTF, from the height of its relief.
 
-A ray toward w that crosses the plane at x has at height z the position x + z s(w), s(w) = (w_x, w_y) / w_z. If it
+A ray toward w that crosses the plane at x is at x + z s(w) at height z, s(w) = (w_x, w_y) / w_z. If it
 meets the relief at height h, the ray toward v that meets the same point crosses the plane at
 
     x_v = x + h (s(w) − s(v)) .
@@ -44,7 +44,7 @@ def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
     """
     across = math.sqrt(x * x + y * y)
     max_slope = np.float32(math.tan(grid.theta[grid.theta.shape[0] - 1]))
-    denominator: Any = max(z, np.float32(1e-6), across / max_slope)
+    denominator = max(z, np.float32(1e-6), across / max_slope)
     return x / denominator, y / denominator
 
 
@@ -68,7 +68,8 @@ def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore
     """Find the height at which a ray first meets the relief, in steps of half a texel and linear in the last.
 
     Args:
-        height: of the relief, in side lengths of the texture. (height, width) float32. lowest, highest: its range.
+        height: height of the relief, in side lengths of the texture. (height, width) float32.
+        lowest, highest: its range.
         u, v: crossing with the plane, in repeats. shear: s of the ray.
     """
     rows, columns = height.shape

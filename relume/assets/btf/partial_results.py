@@ -26,7 +26,7 @@ class PartialCompression:
     """Partial results of a compression, by name.
 
     Args:
-        folder: of the files; created if missing. recipe: JSON description of the compression.
+        folder: folder of the files; created if missing. recipe: JSON description of the compression.
     """
 
     def __init__(self, folder: Path, recipe: Mapping[str, Any]) -> None:

@@ -28,7 +28,7 @@ class ValueFile:
     """Values that are filled view by view, then read; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        folder: of the files; created if missing. grid: of the directions. size: height and width in texels.
+        folder: folder of the files; created if missing. grid: grid of the directions. size: height and width in texels.
     """
 
     def __init__(self, folder: Path, grid: DirectionGrid, size: tuple[int, int]) -> None:
@@ -64,7 +64,7 @@ class ValueFile:
         """
         for view in range(self.num_done, self._shape[0]):
             if is_canceled():
-                raise CancelledError("canceled; start it again to resume")
+                raise CancelledError("the rendering was canceled; start it again to resume")
             progress(view / self._shape[0])
             self._values[view] = np.minimum(images(view), MAX_VALUE)
             self._values.flush()  # type: ignore[attr-defined]

@@ -46,8 +46,9 @@ def _clear(
     """A clear day: Kittler's luminance with colors, a sun and a ground.
 
     Args:
-        elevation: of the sun, degrees. zenith, horizon: colors. (3,) each
-        sun_color: its color. sun_ratio: its irradiance perpendicular to it, over the diffuse irradiance of the ground.
+        elevation: elevation of the sun, degrees. zenith, horizon: colors. (3,) each
+        sun_color: color of the sun.
+        sun_ratio: the sun's irradiance perpendicular to its direction, over the diffuse irradiance of the ground.
     """
     w = texel_directions(HEIGHT, WIDTH).astype(np.float64)
     a, e = np.radians(SUN_AZIMUTH), np.radians(elevation)

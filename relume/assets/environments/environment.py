@@ -19,7 +19,7 @@ class Environment:
 
     Attributes:
         radiance: finite, not negative.
-        warnings: about repairs during import, one sentence each.
+        warnings: warnings about repairs during import, one sentence each.
     """
 
     name: str

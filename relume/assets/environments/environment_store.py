@@ -32,7 +32,7 @@ class EnvironmentRecord:
     """An imported environment in lists.
 
     Attributes:
-        created: seconds since 1970. warnings: about repairs during import, one sentence each.
+        created: seconds since 1970. warnings: warnings about repairs during import, one sentence each.
     """
 
     id: str
@@ -50,7 +50,7 @@ def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecor
     """Import an equirectangular .hdr or .exr file; an existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store.
+        folder: folder of the asset store.
         source: the file to import.
         name: shown to users.
     Raises:

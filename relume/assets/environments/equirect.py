@@ -43,14 +43,14 @@ def direction_to_uv(
 
 
 def halve_to_width(radiance: Shaped[F32, "height width 3"], width: int) -> Shaped[F32, "rows columns 3"]:
-    """Halve an equirectangular map by means of 2 × 2 texels until its width is at most `width` or a side is odd."""
+    """Average 2 × 2 texels of an equirectangular map until its width is at most `width` or a side is odd."""
     while radiance.shape[1] > width and radiance.shape[0] % 2 == radiance.shape[1] % 2 == 0:
         radiance = 0.25 * (radiance[::2, ::2] + radiance[1::2, ::2] + radiance[::2, 1::2] + radiance[1::2, 1::2])
     return radiance
 
 
 def rotate_about_y(direction: Shaped[F64, "n 3"], degrees: float) -> Shaped[F64, "n 3"]:
-    """Rotate directions about +Y, counter-clockwise from above."""
+    """Rotate directions about +Y, counterclockwise from above."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.asarray(direction @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]))
 

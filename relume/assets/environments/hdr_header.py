@@ -38,7 +38,7 @@ def read_header(data: bytes, name: str) -> RadianceHeader:
     """Read a header.
 
     Args:
-        data: of the file. name: of the environment, in messages.
+        data: contents of the file. name: name of the environment, in messages.
     Raises:
         SceneError: there is no header, or rows are not ordered from the top.
     """
@@ -57,7 +57,7 @@ def read_header(data: bytes, name: str) -> RadianceHeader:
 
 
 def _conversion_matrix(primaries: list[bytes]) -> tuple[F64 | None, bool]:
-    """Matrix that converts colors, and True for invalid primaries: many programs write nonsense and mean Rec. 709."""
+    """Matrix that converts colors, and True for invalid primaries: many programs write invalid ones for Rec. 709."""
     try:
         values = [float(number) for number in primaries]
         return (to_rec_709(values), False) if any(values) else (None, False)  # zeros mean unknown

@@ -29,15 +29,13 @@ def read_environment(source: str | Path | bytes, name: str, max_width: int = SCE
 
     Args:
         source: a path or the file's bytes.
-        name: shown to users.
-        max_width: wider maps are averaged down to this width.
-
+        name: name in messages.
+        max_width: limit in texels; wider maps are scaled down to it.
     Returns:
         The environment, in linear Rec. 709 for any primaries of the file, with one warning for each kind of repair:
         non-finite texels become black, negative values 0, radiance is clamped to 1e6, and wide maps are scaled down.
-
     Raises:
-        SceneError: no such file, neither format, empty, damaged, too large, not 2:1, or black.
+        SceneError: the file is missing, empty, damaged, too large, black, not 2:1, or neither .hdr nor .exr.
     """
     data = _read_bytes(source, name)
     if not data:
@@ -56,7 +54,7 @@ class _MapReader:
     """Reads a map in strips of rows, and repairs and downsamples each by an integer factor.
 
     Attributes:
-        width: of the map in the file.
+        width: width of the map in the file.
     """
 
     def __init__(self, name: str, max_width: int) -> None:
@@ -74,11 +72,11 @@ class _MapReader:
         check_claim(header.width * header.height * 12, data, f"environment {self._name!r}")
         self.strips(data, ".hdr", header.to_rec_709)
         if header.has_odd_primaries:
-            warning = f"HDRI {quote(self._name)} has invalid color primaries; it was read as linear Rec. 709."
+            warning = f"Environment {quote(self._name)} has invalid color primaries; it was read as linear Rec. 709."
             self._warnings.append(approximated(warning))
 
     def strips(self, data: bytes, suffix: str, matrix: NDArray[np.float64] | None = None) -> None:
-        """Read all strips. matrix: converts their colors if the file's reader does not"""
+        """Read all strips. matrix: conversion to Rec. 709; None if the decoder has already converted."""
         for strip in read_strips(data, suffix, f"environment {self._name!r}", self._rows):
             if matrix is not None:
                 convert(strip, matrix)
@@ -108,15 +106,18 @@ class _MapReader:
 
     def environment(self) -> Environment:
         """Return the environment with its warnings."""
-        label, warnings, hdri = f"environment {self._name!r}", list(self._warnings), f"HDRI {quote(self._name)}"
+        label, warnings = f"environment {self._name!r}", list(self._warnings)
+        environment = f"environment {quote(self._name)}"
         if self._num_broken == self._num_texels:
             raise SceneError(f"no texel of {label} is a finite number; render or export it again")
         if self._num_broken:
-            warnings.append(unsupported(f"{self._num_broken:,} NaN or infinite texels of {hdri} were made black."))
+            warnings.append(
+                unsupported(f"{self._num_broken:,} NaN or infinite texels of {environment} were made black.")
+            )
         if self._num_negative:
-            warnings.append(approximated(f"{self._num_negative:,} negative texels of {hdri} were set to 0."))
+            warnings.append(approximated(f"{self._num_negative:,} negative texels of {environment} were set to 0."))
         if self._is_bright:
-            warnings.append(approximated(f"Values of {hdri} above {MAX_RADIANCE:g} were clamped."))
+            warnings.append(approximated(f"Values of {environment} above {MAX_RADIANCE:g} were clamped."))
         pixels = self._strip_pixels[0] if len(self._strip_pixels) == 1 else np.concatenate(self._strip_pixels)
         if not pixels.any():
             raise SceneError(f"{label} is black everywhere; choose one with light")
@@ -132,7 +133,10 @@ def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
         except OSError:
             raise SceneError(f"there is no environment file {Path(source).name!r}; check the path") from None
     if size_bytes > MAX_FILE_BYTES:
-        raise SceneError(f"environment {name!r} has {size_bytes / 1e6:,.0f} MB, the limit is 400 MB; scale it down")
+        limit_mb = MAX_FILE_BYTES / 1e6
+        raise SceneError(
+            f"environment {name!r} has {size_bytes / 1e6:,.0f} MB, the limit is {limit_mb:,.0f} MB; scale it down"
+        )
     try:
         return source if isinstance(source, bytes) else Path(source).read_bytes()
     except OSError as problem:
@@ -149,11 +153,11 @@ def _check_size(name: str, width: int, height: int) -> None:
 
 
 def _limit_width(environment: Environment, width: int, max_width: int) -> Environment:
-    """Scale down to `max_width`. width: in the file; the map may be downsampled already"""
+    """Scale down to `max_width`. width: width of the map in the file, before `_MapReader` downsampled it."""
     if width <= max_width:
         return environment
     size = max_width, max_width // 2
-    warning = f"HDRI {quote(environment.name)} was scaled from {width}×{width // 2} to {size[0]}×{size[1]}."
+    warning = f"Environment {quote(environment.name)} was scaled from {width}×{width // 2} to {size[0]}×{size[1]}."
     return Environment(
         environment.name, downsample(environment.radiance, size), (*environment.warnings, approximated(warning))
     )

@@ -29,8 +29,8 @@ class MeasuredFactors:
     """The curves of one material at their knots, rows θi, θh, θd, θo; positive.
 
     Attributes:
-        lobes: of `measured_lv` and `measured_hd`. homomorphic: of `measured_hf`; its θd is one.
-        lobes_error, homomorphic_error: of the products alone, for R, G, B; see `relative_error`.
+        lobes: curves of `measured_lv` and `measured_hd`. homomorphic: curves of `measured_hf`; one for θd.
+        lobes_error, homomorphic_error: errors of the products alone, for R, G, B; see `relative_error`.
     """
 
     lobes: Shaped[F64, "4 3 90"]
@@ -43,7 +43,7 @@ def factorize(planes: Shaped[F64, "3 90 90 180"], table: Shaped[F32, "90 90 180 
     """Factorize a measured BRDF.
 
     Args:
-        planes: of the file. table: from `relume.assets.measured.interpolate.build_table`.
+        planes: measured values, from `read_merl`. table: from `relume.assets.measured.interpolate.build_table`.
     """
     grid = _Grid(planes)
     lobes, homomorphic = np.ones((4, 3, NUM_KNOTS)), np.ones((4, 3, NUM_KNOTS))

@@ -80,7 +80,7 @@ def _interpolate_table(table, h, d, phi, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _measured_over_model_kernel(kind, table, curves, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z, out):  # type: ignore[no-untyped-def]
-    """See `measured_over_model`; flat directions, (n,) each. out: (3, n), written."""
+    """Kernel of `measured_over_model`; directions are flattened, (n,) each. out: (3, n), written."""
     value = np.empty(3)
     for n in range(wi_x.shape[0]):
         ix, iy, iz = float(wi_x[n]), float(wi_y[n]), float(wi_z[n])
@@ -130,9 +130,9 @@ def measured_over_model(
     min(M, G)/G; `SPECULAR` (M − min(M, G))/(f(θh) f'(θd)); `HOMOMORPHIC` M/(G f(θh)).
 
     Args:
-        kind: one of these.
+        kind: the quotient.
         table: the material, from `build_table`.
-        curves: at their knots, positive.
+        curves: curves at their knots, positive.
         directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
     Returns:
         1/sr for `WHOLE`, without the cosine, in the type of the directions; zero at and below the horizon.

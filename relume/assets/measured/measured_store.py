@@ -35,7 +35,8 @@ class MaterialRecord:
 
     Attributes:
         created: seconds since 1970.
-        lobes_error, homomorphic_error: of the curves alone, see `relume.assets.measured.factorize.MeasuredFactors`.
+        lobes_error, homomorphic_error: errors of the curves without the quotient, see
+            `relume.assets.measured.factorize.MeasuredFactors`.
     """
 
     id: str
@@ -50,7 +51,7 @@ class MaterialRecord:
         return STORE.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """Its terms in a look, without textures, since the measurement includes the color."""
+        """Terms of the material in a look, without textures, since the measurement includes the color."""
         return [{"model": model, "data": self.data, "texture": None} for model in ("measured_lv", "measured_hd")]
 
 
@@ -67,10 +68,10 @@ def store_material(folder: Path, source: Path, name: str, file_name: str | None 
     """Import a MERL file; takes some seconds and 0.5 GB. An existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store.
+        folder: folder of the asset store.
         source: the file to import.
         name: shown to users.
-        file_name: in errors; None for the name in the path.
+        file_name: file name in errors; None for the name in the path.
     Raises:
         MaterialError: the file is unusable, or the store is full.
     """

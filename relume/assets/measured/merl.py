@@ -33,7 +33,7 @@ def read_merl(path: Path, file_name: str | None = None) -> Shaped[F64, "3 90 90 
     """Read the planes of a file without conversion.
 
     Args:
-        file_name: in errors; None for the name in the path.
+        file_name: file name in errors; None for the name in the path.
     Returns:
         Finite values, negative if not measured.
     Raises:
@@ -59,7 +59,7 @@ def read_merl(path: Path, file_name: str | None = None) -> Shaped[F64, "3 90 90 
 
 
 def write_merl(path: Path, planes: Shaped[F64, "3 90 90 180"]) -> None:
-    """Write a file for `read_merl`, bit for bit and atomically."""
+    """Write a file atomically; `read_merl` returns the same bits."""
     with atomic_write(path) as unfinished, unfinished.open("wb") as file:
         file.write(_HEADER.pack(*SHAPE))
         file.write(np.ascontiguousarray(planes, "<f8").data)

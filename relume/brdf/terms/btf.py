@@ -27,7 +27,7 @@ class BtfRef:
     """Mapping of a BTF to a surface.
 
     Attributes:
-        data: name of the BTF. components: number in use. btf: with these components alone.
+        data: name of the BTF. components: number of components in use. btf: the BTF with these components only.
         scale: repeats per unit of texture coordinates. rotation: counterclockwise, radians.
     """
 

@@ -43,7 +43,7 @@ def quotient(a, b, c, d, e, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore
     """1/(4 (n·wi)(n·wo) (1 + Λ(θi) + Λ(θo))), zero at and below the horizon.
 
     Args:
-        a, b, c, d, e: of the fit, see `fit_coefficients`.
+        a, b, c, d, e: coefficients of the fit, see `fit_coefficients`.
         wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
         wo_x, wo_y, wo_z: view direction, likewise; they broadcast.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 from relume.image_io.ocio.config import Config
 
 _requested: tuple[str, str | None] | None = None
@@ -30,7 +30,7 @@ def using_config(source: str | None, working: str | None = None) -> Iterator[Non
 
 
 def config_source() -> tuple[str, ...]:
-    """Arguments of `use_config`, for another process that shall use the same config; empty without a config."""
+    """Arguments of `use_config`, for another process that should use the same config; empty without a config."""
     return () if _requested is None else tuple(value for value in _requested if value is not None)
 
 
@@ -46,5 +46,5 @@ def require_config() -> Config:
     """The active config. Raises ParameterError if there is none."""
     config = get_config()
     if config is None:
-        raise ParameterError("RELUME_OCIO", "not set", "an OpenColorIO config, which this needs")
+        raise ParameterError("RELUME_OCIO", Description("not set"), "an OpenColorIO config, which this needs")
     return config

@@ -40,8 +40,10 @@ class Config:
     """A loaded and checked config.
 
     Attributes:
-        name: from the config, or its file name. id: hash of its contents and of the LUT layout. 16 hexadecimal digits
-        working: its name of linear Rec. 709. displays: their views, both in the config's order.
+        name: the config's name, or its file name.
+        id: hash of the config's contents and of the LUT layout. 16 hexadecimal digits
+        working: the config's name of linear Rec. 709.
+        displays: the views of each display, both in the config's order.
         default: the config's default view.
     """
 
@@ -72,7 +74,7 @@ class Config:
             self._processor(self._to_view(self.default))
         except _failures(ocio) as error:
             raise ParameterError(
-                "RELUME_OCIO", source, f"a config whose default view works: {_error_text(error)}"
+                "RELUME_OCIO", source, f"a config whose default view works ({_error_text(error)})"
             ) from None
 
     @cached_property
@@ -112,7 +114,7 @@ class Config:
 
         Args:
             pixels: linear Rec. 709, C-contiguous.
-            use_table: use the view's LUT, in a third of the time, like the editor.
+            use_table: use the view's LUT, as the editor does; takes a third of the time.
         Raises:
             ParameterError: the config has no such view, or it does not work.
         """
@@ -159,7 +161,7 @@ class Config:
             processor = self._processor(transform)  # cached by the config
         except _failures(self._ocio) as error:
             log.warning("%s does not work: %s", label, error)
-            allowed = "another: it needs a file that is missing or damaged, the server's log says which"
+            allowed = "another one, because this one needs a file that is missing or damaged; the server's log names it"
             raise ParameterError("color", label, allowed) from None
         for_ranges(lambda start, stop: processor.applyRGB(pixels[start:stop]), len(pixels), _ROWS_PER_RANGE)
 
@@ -188,11 +190,11 @@ def _read_config(ocio: Any, source: str) -> Any:
     allowed = "the path of a .ocio or .ocioz file, the name of a built-in config (ocio://studio-config-latest), or none"
     path = source if source.startswith("ocio://") else os.path.abspath(source)
     if path is not source and not os.path.isfile(path):
-        raise ParameterError("RELUME_OCIO", source, f"{allowed}; there is no such file")
+        raise ParameterError("RELUME_OCIO", source, f"{allowed} (there is no such file)")
     try:
         config = ocio.Config.CreateFromFile(path)
     except _failures(ocio) as error:
-        raise ParameterError("RELUME_OCIO", source, f"{allowed}; {_error_text(error)}") from None
+        raise ParameterError("RELUME_OCIO", source, f"{allowed} ({_error_text(error)})") from None
     try:
         config.validate()
     except _failures(ocio) as error:  # many configs that work well are not valid

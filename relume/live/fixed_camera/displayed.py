@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
+from relume.look.model import Rgb
 from relume.operators.edit_basis import EditBasis
 from relume.operators.linear_operator import LinearOperator
+from relume.operators.shade import ShadedTerm
 from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
@@ -34,19 +36,19 @@ class DisplayedImage:
 
     Attributes:
         image: Σ_j c_j T_j, in tiles of samples.
-        fidelity: how exactly it shows `bands` under `light`.
+        fidelity: how exactly it shows `bands` under `light`; APPROXIMATE: of another model, other fixed parameters, or
+            other samples than the target's.
         bands: (3, J) float64 of each curve; NaN if only the most important coefficients have been updated.
         light: the illumination; None if nothing is shown.
         basis: the free coefficients of the active operator. coefficients: c along it in `image`.
         rounding: expected norm of the float32 rounding errors in `image` since it was shaded.
-        reference: the last converged image, if that was in another light.
+        reference: the last converged image, if that was in another light; None for a converged image.
         exact_region: the image key (see `LiveTerm.image_key`) and the image region in which it is exact.
         detail: number of refinements of a preview.
-        is_outdated: it shows another model than the target, or other values of fixed parameters.
     """
 
     image: Shaped[F32, "tiles 3 samples"]
-    fidelity: Fidelity = Fidelity.NOTHING
+    fidelity: Fidelity = Fidelity.PREVIEW
     bands: Mapping[str, F64] = field(default_factory=dict)
     light: Illumination | None = None
     basis: EditBasis | None = None
@@ -55,12 +57,22 @@ class DisplayedImage:
     reference: DisplayedImage | None = None
     exact_region: tuple[Hashable, Tile] | None = None
     detail: int = 0
-    is_outdated: bool = False
+
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing has been computed."""
+        return self.light is None
 
     @property
     def is_converged(self) -> bool:
         """True if steps may be added: it is the sum of known coefficients in a known light."""
-        return self.fidelity >= Fidelity.COARSE
+        return not self.is_empty and self.reference is None and self.fidelity > Fidelity.PREVIEW
+
+    def with_samples(
+        self, rows: Shaped[F32, "n 3"], mask: Shaped[NDArray[np.bool_], " n"]
+    ) -> Shaped[F32, "tiles 3 samples"]:
+        """Return a copy of the image with some samples replaced. rows: new values. mask: the samples to replace."""
+        return ShadedTerm.from_rows(np.where(mask[:, None], rows, ShadedTerm(self.image).rows(len(mask)))).image
 
     def changed_curves(self, target_bands: Mapping[str, F64]) -> list[str]:
         """Return the names of the target curves that the image does not show."""
@@ -82,7 +94,7 @@ class DisplayedImage:
         """
         coefficients = basis.coefficients(target_bands)
         operator.write_image(coefficients, self.image)
-        fidelity = Fidelity.EXACT if basis.is_complete and operator.is_exact else Fidelity.NEARLY_EXACT
+        fidelity = Fidelity.EXACT if basis.is_complete and operator.is_exact else Fidelity.NEAR_EXACT
         rounding = accumulated_error(0.0, coefficients, operator)
         return DisplayedImage(
             self.image, fidelity, dict(target_bands), light, basis, coefficients, rounding
@@ -91,11 +103,24 @@ class DisplayedImage:
     def downgrade_if_inexact(self) -> DisplayedImage:
         """Return the same image, nearly exact at most if rounding errors exceed the limit for exact images."""
         is_inexact = self.rounding > MAX_EXACT_ROUNDING * norm_of(self.image)
-        return replace(self, fidelity=min(self.fidelity, Fidelity.NEARLY_EXACT)) if is_inexact else self
+        return replace(self, fidelity=min(self.fidelity, Fidelity.NEAR_EXACT)) if is_inexact else self
 
     def without_edit(self) -> DisplayedImage:
         """Return the same image without an active operator."""
         return replace(self, basis=None, coefficients=None)
+
+
+def weighted_sum(
+    start: Shaped[F32, "tiles 3 samples"], weighted_images: Sequence[tuple[F32, Rgb]]
+) -> Shaped[F32, "tiles 3 samples"]:
+    """Add Σ g R to an image in place (transport is linear in light), and return it.
+
+    Args:
+        start: the image, overwritten. weighted_images: images of the same shape, with a gain per channel.
+    """
+    for image, gain in weighted_images:
+        start += np.array(gain, np.float32)[:, None] * image
+    return start
 
 
 def norm_of(image: Shaped[F32, " ..."]) -> float:

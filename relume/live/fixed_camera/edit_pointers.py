@@ -113,7 +113,8 @@ def parse_pointer(pointer: str) -> Pointer:
     raise ParameterError(
         "pointer",
         pointer,
-        "like /materials/NAME/terms/0/curves/theta_h, …/params/ior, …/color, /lights/NAME or /environment/rotation",
+        "a pointer such as /materials/NAME/terms/0/curves/theta_h, …/params/ior, …/color, /lights/NAME or "
+        "/environment/rotation",
     )
 
 

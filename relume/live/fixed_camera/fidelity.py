@@ -1,47 +1,42 @@
-"""Fidelity of images, and the labels that frames report."""
+"""Fidelity of images: one word, inside and on the wire."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from enum import IntEnum
-from typing import Literal, get_args
+from enum import StrEnum
 
 
-class Fidelity(IntEnum):
-    """Exactness of an image with respect to its curves and its light, worst first.
+class Fidelity(StrEnum):
+    """Exactness of an image with respect to its look, worst first; of several images, the worst counts.
 
-    NOTHING: not computed yet. PREVIEW: interpolated between few samples. INCREMENTAL: an exact image plus an
-    approximate update of changed light. COARSE: an exact image plus the update of a changed curve, computed from some
-    of its samples or from merged lights. NEARLY_EXACT: a sum along the few nodes of a parameter, or of quantized
-    columns.
-    EXACT: the complete sum.
+    - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet.
+    - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image.
+    - INCREMENTAL: an exact image plus the approximate change of its light, or of a curve by merged lights or a subset
+      of the samples.
+    - NEAR_EXACT: a sum over the few nodes of a parameter, of quantized columns, or with noticeable float32 rounding;
+      within a thousandth (relative RMS).
+    - EXACT: the complete sum over all light that was baked.
+
+    Everything below EXACT is replaced when nobody edits. One number goes with it: the error that the replaced image
+    had, if it was measured (`previous_error`).
     """
 
-    NOTHING = 0
-    PREVIEW = 1
-    INCREMENTAL = 2
-    COARSE = 3
-    NEARLY_EXACT = 4
-    EXACT = 5
+    PREVIEW = "preview"
+    APPROXIMATE = "approximate"
+    INCREMENTAL = "incremental"
+    NEAR_EXACT = "near_exact"
+    EXACT = "exact"
+
+    def __lt__(self, other: str) -> bool:
+        return _ORDER.index(self) < _ORDER.index(other)
+
+    def __le__(self, other: str) -> bool:
+        return _ORDER.index(self) <= _ORDER.index(other)
+
+    def __gt__(self, other: str) -> bool:
+        return _ORDER.index(self) > _ORDER.index(other)
+
+    def __ge__(self, other: str) -> bool:
+        return _ORDER.index(self) >= _ORDER.index(other)
 
 
-FidelityLabel = Literal["preview", "approximate", "incremental", "near_exact", "exact"]
-"""Fidelity that a frame reports, worst first; "approximate": it shows an older look, or not all coefficients yet."""
-
-_ORDER: tuple[FidelityLabel, ...] = get_args(FidelityLabel)
-
-
-def fidelity_label(fidelity: Fidelity, *, is_current: bool) -> FidelityLabel:
-    """Return the label of an image. is_current: it shows the target look."""
-    if fidelity <= Fidelity.PREVIEW:
-        return "preview"
-    if not is_current:
-        return "approximate"
-    if fidelity <= Fidelity.COARSE:
-        return "incremental"
-    return "near_exact" if fidelity == Fidelity.NEARLY_EXACT else "exact"
-
-
-def worst(labels: Iterable[FidelityLabel]) -> FidelityLabel:
-    """Return the worst of several labels; "exact" if there are none."""
-    return min(labels, key=_ORDER.index, default="exact")
+_ORDER: tuple[str, ...] = tuple(Fidelity)

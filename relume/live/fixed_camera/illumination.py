@@ -7,7 +7,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-from relume.brdf.albedo import Reflectances, drop_normal_map, pack_reflectance, unpack_normal_map
+from relume.brdf.albedo import Reflectance, Reflectances, material_reflectance
 from relume.brdf.texture_slots import NormalMap
 from relume.look import EnvironmentKey, LightGeometry, LightPaths, Look
 from relume.look.model import Rgb
@@ -34,7 +34,7 @@ class Illumination(NamedTuple):
     """The light in a scene; images in equal light need the same operators.
 
     Attributes:
-        reflectances: of all materials, for indirect illumination; empty if that is not shown.
+        reflectances: reflectances of all materials, for indirect illumination; empty if that is not shown.
         paths: the light paths that are shown; indirect ones only if they were baked.
         local: the lights with a gain above zero. environment_gain: per channel; 1 if there are no local lights, since
             the gain then multiplies the finished image (`picture_gain`).
@@ -49,7 +49,7 @@ class Illumination(NamedTuple):
     @property
     def normals(self) -> Normals:
         """The normal-map overrides of the materials that reflect indirect light."""
-        return tuple(map(unpack_normal_map, self.reflectances))
+        return tuple(material.normals for material in self.reflectances)
 
     @property
     def has_environment(self) -> bool:
@@ -209,7 +209,7 @@ def equal_up_to_reflectances(before: Illumination, after: Illumination) -> bool:
 @lru_cache(maxsize=_MAX_CACHED_LIGHTS)
 def with_baked_normals(light: Illumination) -> Illumination:
     """Return the same light without normal-map overrides in indirect illumination."""
-    return light._replace(reflectances=tuple(map(drop_normal_map, light.reflectances)))
+    return light._replace(reflectances=tuple(map(Reflectance.with_baked_normals, light.reflectances)))
 
 
 def illumination_from_look(
@@ -233,5 +233,5 @@ def illumination_from_look(
         return light
     materials = (look.materials[name] for name in material_names)
     return light._replace(
-        reflectances=tuple(pack_reflectance(material.terms, material.normals) for material in materials)
+        reflectances=tuple(material_reflectance(material.terms, material.normals) for material in materials)
     )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.specular import specular_albedo
 from relume.live.fixed_camera.displayed import DisplayedImage
-from relume.live.fixed_camera.fidelity import Fidelity, FidelityLabel, fidelity_label
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.target import TargetTerm
 from relume.operators.edit_basis import EditBasis
@@ -33,7 +33,7 @@ class LiveTerm:
     """State of one term.
 
     Attributes:
-        document: of the term in the newest look. light: the target illumination.
+        document: document of the term in the newest look. light: the target illumination.
         term: the declaration of its model with its fixed parameters. model: identifies the model and these parameters.
         target_bands: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `TargetTerm`
         target_rows_key: the same as bytes, in order of the curves' names, for keys.
@@ -69,10 +69,9 @@ class LiveTerm:
         Args:
             before: the other term. rows: index of each sample of this term among its samples.
         """
-        if before.displayed.fidelity:
+        if not before.displayed.is_empty:
             image = ShadedTerm.from_rows(ShadedTerm(before.displayed.image).rows(len(rows))[rows]).image
-            base = before.displayed.without_edit()
-            self.displayed = replace(base, image=image, bands={}, reference=None, exact_region=None, is_outdated=True)
+            self.displayed = DisplayedImage(image, Fidelity.APPROXIMATE, light=before.displayed.light)
             self.mirror, self.is_composed = before.mirror, False
 
     def set_document(self, document: Mapping[str, Any]) -> None:
@@ -80,7 +79,8 @@ class LiveTerm:
         target = TargetTerm.from_document(document, lambda: self._theta_o, self._levels)
         if target.model != self.model:
             self.ready, self._before_solo = DisplayedImage(np.zeros_like(self.ready.image)), None
-            self.displayed = replace(self.displayed, bands={}, is_outdated=True)  # the target has none of its curves
+            if not self.displayed.is_empty:  # the target has none of its curves
+                self.displayed = replace(self.displayed, bands={}, fidelity=Fidelity.APPROXIMATE)
         elif self.ready.basis is not None and not self.ready.basis.is_valid_for(document):
             self.ready = self._replace_ready(self.ready.without_edit())
         self.document, self.term, self.model = target.document, target.term, target.model
@@ -130,23 +130,18 @@ class LiveTerm:
 
     def display_ready(self) -> None:
         """Display the newest image, if there is one."""
-        if self.ready.fidelity and self.displayed is not self.ready:
+        if not self.ready.is_empty and self.displayed is not self.ready:
             self.displayed, self.is_composed = self.ready, False
 
     @property
     def latest(self) -> DisplayedImage:
         """The newest image if there is one, else the displayed image."""
-        return self.ready if self.ready.fidelity else self.displayed
-
-    @property
-    def is_empty(self) -> bool:
-        """True if there is no image to display."""
-        return not self.latest.fidelity
+        return self.displayed if self.ready.is_empty else self.ready
 
     @property
     def displays_outdated(self) -> bool:
         """True if there is no newer image, and the displayed one has another model or other fixed parameters."""
-        return self.displayed.is_outdated and not self.ready.fidelity
+        return self.ready.is_empty and self.displayed.fidelity == Fidelity.APPROXIMATE
 
     @property
     def is_converged(self) -> bool:
@@ -168,7 +163,7 @@ class LiveTerm:
         never repeated, and does not show curves that changed since.
         """
         ready = self.ready
-        is_preview = ready.fidelity > Fidelity.NOTHING and not ready.is_converged
+        is_preview = not ready.is_empty and not ready.is_converged
         return is_preview and (ready.reference is not None or not ready.changed_curves(self.target_bands))
 
     def needs_only_light(self) -> bool:
@@ -177,15 +172,11 @@ class LiveTerm:
         return reference is not None and not self.is_converged and not reference.changed_curves(self.target_bands)
 
     @property
-    def fidelity_label(self) -> FidelityLabel:
+    def fidelity(self) -> Fidelity:
         """Fidelity of the displayed image with respect to the look."""
         displayed = self.displayed
-        is_current = (
-            not displayed.is_outdated
-            and displayed.light == self.light
-            and not displayed.changed_curves(self.target_bands)
-        )
-        return fidelity_label(displayed.fidelity, is_current=is_current)
+        is_current = displayed.light == self.light and not displayed.changed_curves(self.target_bands)
+        return displayed.fidelity if is_current else min(displayed.fidelity, Fidelity.APPROXIMATE)
 
     def operator_key(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
         """Dependencies of an operator besides view and material: model, light, and its fixed curves."""

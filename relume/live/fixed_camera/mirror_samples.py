@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.specular import specular_terms
+from relume.brdf.specular_reflectance import specular_terms
 from relume.camera.ray_paths import NO_MIRROR
 from relume.lights.local_lights import rectangle
 from relume.live.fixed_camera.illumination import Illumination, LightSource

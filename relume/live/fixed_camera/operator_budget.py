@@ -44,7 +44,8 @@ def compressed_bytes(material: MaterialImage, num_columns: int, form: Compressio
     """Return the memory of an operator for a term of a material.
 
     Args:
-        material: the image of a material. num_columns: in each channel. form: of the operator.
+        material: the image of a material. num_columns: number of columns of the operator, in each channel.
+        form: compression of the operator.
     """
     num_selected = None if form.step == 1 else material.num_pixel_blocks(form.step)
     return operator_bytes(material.num_samples, num_columns, form.bits, num_selected)
@@ -54,7 +55,8 @@ def operator_form(material: MaterialImage, num_columns: int, budget_bytes: int) 
     """Return the best form of an operator that fits the budget; None if none does.
 
     Args:
-        material: the image of a material. num_columns: of the operator, in each channel. budget_bytes: of the cache.
+        material: the image of a material. num_columns: number of columns of the operator, in each channel.
+        budget_bytes: budget in bytes of the cache.
     """
     if compressed_bytes(material, num_columns, EXACT) <= budget_bytes:
         return EXACT

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,18 +12,17 @@ from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.core.cache import Cache
-from relume.core.errors import ParameterError
-from relume.live.fixed_camera.active_control import ActiveControl, HeldControl
-from relume.live.fixed_camera.background.background import Background
+from relume.core.errors import CancelledError, ParameterError
+from relume.live.fixed_camera.background import Background
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
-from relume.live.fixed_camera.fidelity import FidelityLabel, worst
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Solo
-from relume.live.fixed_camera.jobs import Job, PrecomputeOperator, TermTarget
+from relume.live.fixed_camera.jobs import CancelCheck, Job, ProgressCallback
 from relume.live.fixed_camera.pixel_probe import highlight_pixels, probe
-from relume.live.fixed_camera.priority_region import fidelity_label_in
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.fixed_camera.scheduler import StrategyScheduler
-from relume.live.fixed_camera.view_images import ViewImages, material_documents
+from relume.live.fixed_camera.strategies.strategy import ActiveControl, HeldControl
+from relume.live.fixed_camera.view_images import TermTarget, ViewImages, material_documents
 from relume.look import Look
 from relume.operators.shade import shaded_bytes
 from relume.views.resolve import encode, encode_coverage, resolve
@@ -38,13 +37,13 @@ class Progress:
 
     Attributes:
         tiles: x, y, width, height of the updated tiles. exact: the picture shows its look exactly.
-        fidelity: of the visible region. complete: every term has an image.
+        fidelity: fidelity of the visible region. complete: every term has an image.
         previous_error: relative RMS difference of an exact image from the image it replaces, for a free camera.
     """
 
     tiles: list[Tile]
     exact: bool
-    fidelity: FidelityLabel
+    fidelity: Fidelity
     complete: bool
     previous_error: float | None = None
 
@@ -134,21 +133,22 @@ class Picture:
     def next_job(self) -> Job | None:
         """Return the next job for the look or for the prepared control; None if nothing is missing.
 
-        The picture may advance while the job runs: everything that does not depend on it follows the look.
+        The picture may advance while the job runs: everything that does not depend on it follows the look. Its result
+        is ignored if the look has changed so that it is no longer needed.
         """
-        return self._scheduler.next_job(self._active_control(), self._look)
+        job = self._scheduler.next_job(self._active_control(), self._look)
+        return None if job is None else replace(job, apply=lambda result: self._apply(job, result))
 
-    def install(self, job: Job, result: Any) -> None:
-        """Use the result of a job, unless the look has changed so that it is no longer needed."""
-        self._scheduler.install(job, result)
+    def _apply(self, job: Job, result: Any) -> None:
+        """Apply a result; if it activates the operator of another control, the user edits that one now."""
         prepared = self._active_control().prepared_control
-        if not isinstance(job, PrecomputeOperator) or prepared is None or prepared.target.live is not job.target.live:
-            return
-        if prepared.basis != job.basis and prepared.target.live.ready.basis == job.basis:
-            self._prepared_pointer = None  # the user edits something else of this term now
+        active = None if prepared is None else prepared.target.live.ready.basis
+        job.apply(result)
+        if prepared is not None and prepared.target.live.ready.basis not in (None, active, prepared.basis):
+            self._prepared_pointer = None
 
-    def run_next_job(self, progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> None:
-        """Run the next job and install its result.
+    def run_next_job(self, progress: ProgressCallback, is_canceled: CancelCheck) -> None:
+        """Run the next job and apply its result.
 
         Raises:
             CancelledError: `is_canceled` returned true; the picture is unchanged.
@@ -156,7 +156,7 @@ class Picture:
         """
         job = self.next_job()
         if job is not None:
-            self.install(job, job.run(progress, is_canceled))
+            job.apply(job.run(progress, is_canceled))
 
     def advance(self, max_coefficients: int | None) -> Progress:
         """Update the image toward its look: R += T · Δc with the most important coefficients, None for all."""
@@ -175,11 +175,10 @@ class Picture:
         if is_background_new or not np.array_equal(self._gain, gain):
             self._gain = gain
             tiles.update(self._view.all_tiles)
-        exact = all(live.fidelity_label == "exact" for _, live in images.terms())
-        fidelity = worst(
-            fidelity_label_in(TermTarget(images, *material_term), images.region) for material_term in images.terms()
-        )
-        complete = not any(live.is_empty for _, live in images.terms())
+        targets = list(images.targets())
+        exact = all(target.live.fidelity == Fidelity.EXACT for target in targets)
+        fidelity = min((target.fidelity_in(images.region) for target in targets), default=Fidelity.EXACT)
+        complete = not any(target.live.latest.is_empty for target in targets)
         in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
         return Progress(in_order, exact, fidelity, complete)
 
@@ -241,3 +240,29 @@ class Picture:
             )
         except ParameterError:
             return None
+
+
+def render_exact(picture: Picture, look: Look, progress: ProgressCallback, is_canceled: CancelCheck) -> None:
+    """Run all jobs of a picture until it shows its look exactly.
+
+    Args:
+        picture: its look has been set. look: the same look.
+        progress: called with the approximate fraction done. is_canceled: polled regularly.
+    Raises:
+        CancelledError: `is_canceled` returned true.
+    """
+    num_terms, num_images = sum(len(material.terms) for material in look.materials.values()), 0
+    while True:
+        if is_canceled():
+            raise CancelledError("the picture was canceled")
+        exact = picture.advance(None).exact
+        if picture.next_job() is None and exact:
+            progress(1.0)
+            return
+
+        def report_overall(fraction: float, num_images: int = num_images) -> None:
+            # most looks need at most one image per term
+            progress(min(num_images + fraction, num_terms) / max(1, num_terms))
+
+        picture.run_next_job(report_overall, is_canceled)
+        num_images += 1

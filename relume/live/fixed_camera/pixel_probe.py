@@ -31,8 +31,8 @@ def probe(
     """Return a pixel's material, surface position, radiance, and the contribution of each band of its active curve.
 
     Args:
-        images: of the picture. x, y: the pixel.
-        radiance: of every view sample, float32. gain: multiplies each channel.
+        images: images of the picture. x, y: the pixel.
+        radiance: radiance of every view sample, float32. gain: multiplies each channel.
         prepared_pointer: the term to report, if it belongs to the pixel's material.
     Raises:
         ParameterError: the pixel lies outside the image.

@@ -1,4 +1,4 @@
-"""Interface of an open bake for pictures, independent of the method; `relume.methods` implements it."""
+"""Interface of an open bake for pictures, independent of the method; `relume.live.opened` implements it."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class IndirectLight(Protocol):
     def solve_indirect(
         self, light: Illumination, quality: LightQuality, start_from: Illumination | None = None
     ) -> PatchRadiance:
-        """Return the outgoing radiance of patches; see `relume.methods.indirect_solver`.
+        """Return the outgoing radiance of patches; see `relume.live.opened.indirect_solver`.
 
         Args:
             light: the illumination. quality: exact, or fast for active edits.
@@ -134,7 +134,9 @@ class LocalLightTransport(Protocol):
         ...
 
     def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
-        """Return the same as rays, for terms that depend on the incident direction. visible: of `MovingLight`"""
+        """Return the same as rays, for terms that depend on the incident direction. visible: visibility of
+        `MovingLight`
+        """
         ...
 
     def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
@@ -253,7 +255,8 @@ class FixedViewTransfer(OpenBake, Protocol):
         """Return the incident light at samples; missing rays are traced.
 
         Args:
-            samples: of this bake. light: the illumination with its reflectances. quality: of the light.
+            samples: samples of this bake. light: the illumination with its reflectances.
+            quality: accuracy of the light.
             is_canceled: polled regularly.
         Raises:
             CancelledError: `is_canceled` returned true.

@@ -23,10 +23,10 @@ class TargetTerm:
     """The target state of a term.
 
     Attributes:
-        document: of the term in a look. term: the declaration of its model with its fixed parameters.
+        document: document of the term in a look. term: the declaration of its model with its fixed parameters.
         model: identifies the model and these parameters.
-        bands: of each curve that depends on the incident direction. (3, J) float64 each, or (L, 3, J) if it differs
-            between roughness levels
+        bands: bands of each curve that depends on the incident direction. (3, J) float64 each, or (L, 3, J) if it
+            differs between roughness levels
         view_factor: product of the curves of the outgoing angle, per sample; None for 1.
     """
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from copy import copy
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import uses_roughness_map
@@ -15,6 +16,7 @@ from relume.brdf.texture_slots import roughness_image
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import (
     Illumination,
     Solo,
@@ -26,7 +28,13 @@ from relume.live.fixed_camera.illumination import (
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.mirror_samples import MirrorFactors
-from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer, LightQuality, LightsAndPoints
+from relume.live.fixed_camera.protocols import (
+    EditAxis,
+    FixedViewTransfer,
+    LightQuality,
+    LightsAndPoints,
+    PatchRadiance,
+)
 from relume.look import Look, TermLook, validate
 from relume.operators.edit_basis import CurveBasis, EditBasis
 from relume.operators.linear_operator import LinearOperator
@@ -51,14 +59,28 @@ def material_documents(look: Look, material: str) -> Sequence[TermLook]:
     return (cast(TermLook, _WHITE),) if material_look.shadow_catcher else material_look.terms
 
 
+class OutgoingChange(NamedTuple):
+    """Change of outgoing radiance between two lights, equal for all terms.
+
+    Attributes:
+        before, after: the lights. radiance: change of the patches. coefficients: Haar coefficients of this change.
+    """
+
+    before: Illumination
+    after: Illumination
+    radiance: PatchRadiance
+    coefficients: Shaped[F32, "padded 3"]
+
+
 class ViewImages:
     """Material images of one view, by name, by pointer, and with their cache keys.
 
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: the illumination. default_light: that of the scene's own look.
-        gain: of the finished image. mirrors: the mirrors of the image.
+        gain: gain of the finished image. mirrors: the mirrors of the image.
         region: visible pixels of the image: x, y, width, height; None: all.
+        outgoing_change: of the last incremental update, for the next term.
     """
 
     def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
@@ -73,6 +95,7 @@ class ViewImages:
         self.gain = picture_gain(self.default)
         self.mirrors = MirrorFactors(self.view)
         self.region: Tile | None = None
+        self.outgoing_change: OutgoingChange | None = None
 
     def view_with_overrides(self, look: Look) -> ViewImages:
         """Return the images of the view with the roughness- and normal-map overrides of a look; self if they are
@@ -118,6 +141,10 @@ class ViewImages:
         """Yield the terms that are visible in this view."""
         materials = self.by_name.values()
         return ((material, image) for material in materials if material.num_samples for image in material.terms)
+
+    def targets(self) -> Iterator[TermTarget]:
+        """Yield the same terms as targets of strategies and jobs."""
+        return (TermTarget(self, material, live) for material, live in self.terms())
 
     def image_bytes(self) -> int:
         """Return the memory of one image of every term."""
@@ -203,7 +230,7 @@ class ViewImages:
         declared = term.term.curves if isinstance(pointer, CurvePointer) else term.term.parameters
         names = [item.name for item in declared]
         if pointer.name not in names:
-            raise ParameterError(str(pointer), pointer.name, ", ".join(names))
+            raise ParameterError(str(pointer), pointer.name, "one of " + ", ".join(names))
         return material, term
 
     def basis(self, pointer: CurvePointer | ParameterPointer) -> EditBasis | None:
@@ -234,7 +261,8 @@ class ViewImages:
         """Cache key of the operator of `live`, a term of `material`, along a basis.
 
         Args:
-            bands: of the term's curves, (3, J) each; those of the basis are free. is_merged_light: it is from merged
+            bands: bands of the term's curves, (3, J) each; those of the basis are free.
+            is_merged_light: it is from merged
                 lights.
         """
         return (
@@ -264,3 +292,48 @@ class ViewImages:
         key = self.operator_key(material, live, ready.basis, ready.bands)
         candidates = (self.cache.get_cached(name, LinearOperator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))
         return next((operator for operator in candidates if operator is not None), None)
+
+
+class TermTarget(NamedTuple):
+    """A term of a picture: its view and material, and its state."""
+
+    images: ViewImages
+    material: MaterialImage
+    live: LiveTerm
+
+    @property
+    def name(self) -> str:
+        """The name of the material."""
+        return self.images.transfer.material_names[self.material.index]
+
+    @property
+    def label(self) -> str:
+        """Text for the user."""
+        return f"{self.name}, {self.live.term.label}"
+
+    def exists(self) -> bool:
+        """Return whether the look still contains this term."""
+        return any(self.live is term for term in self.material.terms)
+
+    def is_visible(self, region: Tile | None) -> bool:
+        """Return whether any sample of its material lies in a region; None: in the image."""
+        return region is None or bool(self.material.lies_in(region).any())
+
+    def is_exact_within(self, region: Tile | None) -> bool:
+        """Return whether its newest image is exact in a region, though not everywhere."""
+        images, material, live = self
+        exact_region = live.ready.exact_region
+        if region is None or exact_region is None or not _contains(exact_region[1], region):
+            return False
+        return exact_region[0] == images.image_key(material, live, live.light)
+
+    def fidelity_in(self, region: Tile | None) -> Fidelity:
+        """Return the fidelity of its displayed image in a region; None: everywhere."""
+        live = self.live
+        is_exact = live.displayed is live.ready and self.is_exact_within(region)
+        return Fidelity.EXACT if is_exact or not self.is_visible(region) else live.fidelity
+
+
+def _contains(outer: Tile, inner: Tile) -> bool:
+    (x, y, width, height), (left, top, across, down) = outer, inner
+    return x <= left and y <= top and left + across <= x + width and top + down <= y + height

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.camera_rays import Hits
 
 F32 = NDArray[np.float32]
@@ -26,17 +26,17 @@ _DEPTH_EDGE = np.float32(0.02)  # offset from the plane of the adjacent surface,
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def is_edge(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
+def is_edge(material, normals, hits, directions, p, q):  # type: ignore[no-untyped-def]
     """Return whether two pixels show different materials, or one material with another normal or offset.
 
     Args:
-        material, normals: of faces. (faces,), (faces, 3). faces: visible in pixels, −1 for none. (pixels,)
-        distance, directions: of the pixels' rays. (pixels,), (pixels, 3) float32. p, q: the pixels.
+        material, normals: of faces. (faces,), (faces, 3). hits: `Hits` of the pixels' rays. directions: of these rays.
+            (pixels, 3) float32. p, q: the pixels.
     """
     # no branches: Numba would count array references in each, which took two thirds of the time
-    f, g = faces[p], faces[q]
+    (face, _, distance), cosine, plane_distance = hits, np.float32(0), np.float32(0)
+    f, g = face[p], face[q]
     a, b = max(f, 0), max(g, 0)
-    cosine = plane_distance = np.float32(0)
     for axis in range(3):
         cosine += normals[a, axis] * normals[b, axis]
         plane_distance += normals[a, axis] * (distance[q] * directions[q, axis] - distance[p] * directions[p, axis])
@@ -47,14 +47,14 @@ def is_edge(material, normals, faces, distance, directions, p, q):  # type: igno
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _mark(material, normals, faces, distance, directions, width, height, start, stop, edge_mask):  # type: ignore[no-untyped-def]
+def _mark(material, normals, hits, directions, width, height, start, stop, edge_mask):  # type: ignore[no-untyped-def]
     """Mark pixels [start, stop) and their right and lower neighbors across edges; threads may mark a pixel twice."""
     column = start % width
     for p in range(start, stop):
-        if column < width - 1 and is_edge(material, normals, faces, distance, directions, p, p + 1):
+        if column < width - 1 and is_edge(material, normals, hits, directions, p, p + 1):
             edge_mask[p] = edge_mask[p + 1] = True
         column = column + 1 if column < width - 1 else 0
-        if p < width * (height - 1) and is_edge(material, normals, faces, distance, directions, p, p + width):
+        if p < width * (height - 1) and is_edge(material, normals, hits, directions, p, p + width):
             edge_mask[p] = edge_mask[p + width] = True
 
 
@@ -64,12 +64,12 @@ def find_edges(
     """Return the pixels on edges in row-major order.
 
     Args:
-        stored_scene: the scene. hits: of the rays through all pixel centers. directions: of these rays.
+        stored_scene: the scene. hits: hits of the rays through all pixel centers. directions: directions of these rays.
         size: width and height in pixels.
     """
     width, height = size
     edge_mask = np.zeros(width * height, np.bool_)
-    args = (stored_scene.face_material, stored_scene.face_normal, hits.face, hits.distance, directions, width, height)
+    args = stored_scene.face_material, stored_scene.face_normal, hits, directions, width, height
     parallel_for_chunks(lambda start, stop: _mark(*args, start, stop, edge_mask), width * height)
     return np.flatnonzero(edge_mask).astype(np.int32)
 
@@ -85,7 +85,7 @@ def resolve(
     """Average all rays of each pixel.
 
     Args:
-        values: of the rays through all pixel centers, then of the extra rays.
+        values: values of the rays through all pixel centers, then of the extra rays.
         owner: pixels of the extra rays.
     Returns:
         The mean per pixel, num_pixels in all.

@@ -1,6 +1,6 @@
 """Background compositing for the free camera, and on shadow catchers.
 
-As in fixed views (`relume.live.fixed_camera.background.background`), a shadow catcher shows the background times the
+As in fixed views (`relume.live.fixed_camera.background`), a shadow catcher shows the background times the
 ratio of incident light with and without the objects; if no light would arrive, nothing is occluded.
 """
 
@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 from relume.core.color import LUMINANCE, srgb_encode
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO
+from relume.live.fixed_camera.background import MAX_CATCHER_RATIO
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.environment_lookup import sample
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.look.model import BackgroundLook
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 
 _MAX_CATCHER_RATIO = np.float32(MAX_CATCHER_RATIO)
+_LUMINANCE = np.array(LUMINANCE, np.float32)
 
 
 class ShadowCatcher(NamedTuple):
@@ -53,8 +54,9 @@ def background_radiance(
     """Return the background along rays that show it or a shadow catcher, float32; zero elsewhere.
 
     Args:
-        transfer: of the picture. background, light: of its look. gain: of the finished image per channel.
-        gbuffer: of the rays. is_shadow_catcher: per material.
+        transfer: transfer of the picture. background, light: background and light of its look.
+        gain: gain of the finished image per channel.
+        gbuffer: G-buffer of the rays. is_shadow_catcher: per material.
     """
     num_rays = len(gbuffer.directions)
     if background.kind == "color":
@@ -87,7 +89,8 @@ def composite_over(
     """Composite surfaces over the background, and shadows of catchers onto it.
 
     Args:
-        stored_scene: the scene. gbuffer: of the rays. background: from `background_radiance`. shadow_catcher: data of
+        stored_scene: the scene. gbuffer: G-buffer of the rays. background: from `background_radiance`.
+        shadow_catcher: data of
             shadow catchers.
         gain: that `out` has been multiplied by.
         is_direct: direct light is shown, and with it the background.
@@ -96,22 +99,19 @@ def composite_over(
         Coverage along each ray.
     """
     coverage = np.empty(len(out), np.float32)
-    args = (
-        np.array(LUMINANCE, np.float32), gbuffer.hits.face, stored_scene.face_material,
-        shadow_catcher.is_shadow_catcher, shadow_catcher.unoccluded,
-        gbuffer.lattice_node, gbuffer.weight, background, np.asarray(gain, np.float32), is_direct,
-    )  # fmt: skip
+    surface_args = gbuffer, stored_scene.face_material, shadow_catcher
+    args = *surface_args, background, np.asarray(gain, np.float32), is_direct
     parallel_for_chunks(lambda start, stop: _composite_over(*args, start, stop, out, coverage), len(out))
     return coverage
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _composite_over(  # type: ignore[no-untyped-def]
-    luminance, face, face_material, is_shadow_catcher, unoccluded, lattice_node, weight, background, gain, is_direct,
-    start, stop, out,
-    coverage,
-):  # fmt: skip
+    gbuffer, face_material, shadow_catcher, background, gain, is_direct, start, stop, out, coverage
+):
     """Composite rays [start, stop)."""
+    face, lattice_node, weight = gbuffer.hits.face, gbuffer.lattice_node, gbuffer.weight
+    is_shadow_catcher, unoccluded = shadow_catcher
     direct_factor = np.float32(1) if is_direct else np.float32(0)
     for p in range(start, stop):
         if face[p] < 0:
@@ -135,7 +135,7 @@ def _composite_over(  # type: ignore[no-untyped-def]
                     else direct_factor
                 )
                 out[p, channel] = shadow_ratio * background[p, channel]
-                coverage[p] -= luminance[channel] * min(shadow_ratio, np.float32(1))
+                coverage[p] -= _LUMINANCE[channel] * min(shadow_ratio, np.float32(1))
 
 
 def alpha(coverage: Shaped[F32, " ..."], *, for_display: bool) -> Shaped[F32, " ..."]:

@@ -28,7 +28,7 @@ def pivot_of(transfer: FreeCameraTransfer, camera: Camera) -> Shaped[F64, " 3"]:
     itself.
 
     Args:
-        transfer: of a bake. camera: any.
+        transfer: transfer of a bake. camera: any.
     """
     position, forward, stored_scene = camera.to_world[:3, 3], -camera.to_world[:3, 2], transfer.stored_scene
     ray = position.astype(np.float32), forward[None].astype(np.float32)
@@ -67,7 +67,7 @@ def interpolate_cameras(cameras: Sequence[Camera], num_cameras: int) -> list[Cam
     logarithm.
 
     Args:
-        cameras: at least one. num_cameras: of cameras on the path, ends included.
+        cameras: at least one. num_cameras: number of cameras of cameras on the path, ends included.
     """
     if len(cameras) == num_cameras or len(cameras) == 1:
         return list(cameras) if len(cameras) == num_cameras else [cameras[0]] * num_cameras

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -64,7 +64,7 @@ def _sample_level(environment, level, u, v):  # type: ignore[no-untyped-def]
     """Sample one level, bilinear and periodic in u. Returns three numbers."""
     first, height, width = environment.levels[level, 0], environment.levels[level, 1], environment.levels[level, 2]
     x = u * np.float32(width) - np.float32(0.5)
-    y: Any = min(max(v * np.float32(height) - np.float32(0.5), np.float32(0)), np.float32(height - 1))
+    y = min(max(v * np.float32(height) - np.float32(0.5), np.float32(0)), np.float32(height - 1))
     # floor without a call: x is at least −½
     column, row = np.int64(x + np.float32(1)) - 1, np.int64(y)
     fx, fy = x - np.float32(column), y - np.float32(row)
@@ -97,15 +97,15 @@ def add_environment(environment, rotation, direction, level, gain, out):  # type
     """Add the prefiltered radiance in a direction.
 
     Args:
-        environment: its levels. rotation: of the map, in turns, plus one half.
-        direction: unit, a tuple. level: of the blur, from `blur_level`. gain: a factor.
+        environment: its levels. rotation: rotation of the map, in turns, plus one half.
+        direction: unit, a tuple. level: level of the blur, from `blur_level`. gain: a factor.
         out: added to. (3,)
     """
-    level_coordinate: Any = min(level, np.float32(environment.levels.shape[0] - 1))
+    level_coordinate = min(level, np.float32(environment.levels.shape[0] - 1))
     lower = np.int64(level_coordinate)
     fraction = level_coordinate - np.float32(lower)
     u, v = _direction_to_uv(rotation, direction[0], direction[1], direction[2])
-    upper: Any = min(lower + 1, environment.levels.shape[0] - 1)
+    upper = min(lower + 1, environment.levels.shape[0] - 1)
     sharp, blurred = _sample_level(environment, lower, u, v), _sample_level(environment, upper, u, v)
     for channel in range(3):
         out[channel] += gain * (sharp[channel] + fraction * (blurred[channel] - sharp[channel]))
@@ -139,9 +139,9 @@ def sample(
     """Write the environment to pixels without a surface.
 
     Args:
-        radiance: of the environment, equirectangular.
+        radiance: radiance of the environment, equirectangular.
         rotation: about +Y, degrees, counterclockwise from above. gain: per channel.
-        face: of each pixel, −1 for none. directions: unit, of the rays.
+        face: face of each pixel, −1 for none. directions: unit, of the rays.
         out: radiance, float32, written there.
     """
     environment = EnvironmentLookup(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -18,27 +19,28 @@ from relume.live.free_camera.basis.highlight_lobes import Lobes, build_lobes
 from relume.live.free_camera.basis.material_tables import Tables, build_tables
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.glass import adjust_alpha, composite_glass
-from relume.live.free_camera.hard_shadows.shade import add_direct_sharp
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.highlights.interpolated_highlights import add_environment_highlights
+from relume.live.free_camera.highlights.interpolated_highlights import ProbeHighlights, add_environment_highlights
 from relume.live.free_camera.highlights.light_sum_kernel import sum_lights
 from relume.live.free_camera.highlights.lobe_gradients import gradients_along_lobe
 from relume.live.free_camera.highlights.lobe_light_lists import MAX_BRIGHT_LIGHTS, lobe_widths
 from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
+from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, DirtyRegion, resolve_subset
 from relume.live.free_camera.normal_mapping import light_gradient
 from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
-from relume.live.free_camera.probe_light.incident import IncidentCoefficients
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.texture_overrides import ProbeMapOverrides
 from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.live.free_camera.shade_hard_shadows import add_direct_sharp
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import ProbeRadiance, shade_probes
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterials, find_btf_materials
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
+from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
+from relume.probes.stored_scene import StoredScene, ViewedProbes
 from relume.scene.model import Camera
+from relume.views.resolve import pack_pixels
 
 F32 = NDArray[np.float32]
 
@@ -62,7 +64,7 @@ class MaterialState(NamedTuple):
     """The materials of a look, projected.
 
     Attributes:
-        tables: outgoing coefficients. lobes: of narrow terms.
+        tables: outgoing coefficients. lobes: lobes of narrow terms.
         is_reflective: a material reflects any light by a group of terms.
         btf_materials: materials with a BTF.
         projected: the terms of each, projected.
@@ -88,7 +90,7 @@ class MaterialState(NamedTuple):
         """Project the terms of each material, of a complete look.
 
         Args:
-            terms: of each. previous: an earlier state, to reuse what has not changed.
+            terms: terms of each. previous: an earlier state, to reuse what has not changed.
             normals: normal-map overrides of each; None: none.
             is_blocking: see `find_btf_materials`.
         """
@@ -122,7 +124,8 @@ class FrameRequestState(NamedTuple):
     """The target of a frame.
 
     Attributes:
-        look: its materials and background are used. light: the illumination. gain: of the finished image, per channel.
+        look: its materials and background are used. light: the illumination.
+        gain: gain of the finished image, per channel.
         incident: incident radiance coefficients of that light. is_coarse: they are approximate.
         texel_light: cached incident light of BTF texels.
         is_fine: pixels use two lobes like probes, and highlight edges are antialiased
@@ -143,10 +146,10 @@ class ShadingBuffers(NamedTuple):
     """Intermediate results of a frame.
 
     Attributes:
-        lobe_visibility: of probes along their lobes. outgoing: radiance of probes.
-        gradients: of probes, from `relume.live.free_camera.highlights.lobe_gradients`.
+        lobe_visibility: lobe visibility of probes along their lobes. outgoing: radiance of probes.
+        gradients: gradients of probes, from `relume.live.free_camera.highlights.lobe_gradients`.
         node_values: outgoing radiance, lobe visibility and gradients of lattice nodes.
-        light_gradient: of lattice nodes, see `InterpolatedProbes`.
+        light_gradient: light gradient of lattice nodes, see `InterpolatedProbes`.
         radiance: along the rays.
     """
 
@@ -183,9 +186,9 @@ def render_frame(
     """Render a frame without antialiasing of highlight edges.
 
     Args:
-        transfer: of the bake. state: the target.
-        gbuffer: of the camera's rays. size: width and height in pixels.
-        shadow_visibility: of each hard-shadow light along the rays. (rays,) float32 each
+        transfer: transfer of the bake. state: the target.
+        gbuffer: G-buffer of the camera's rays. size: width and height in pixels.
+        shadow_visibility: shadow visibility of each hard-shadow light along the rays. (rays,) float32 each
     """
     width, height = size
     final_frame = finish_rays(transfer, state, gbuffer, camera, height, shadow_visibility)
@@ -221,7 +224,7 @@ def finish_rays(
     """Return the radiance of rays, with glass and background.
 
     Args:
-        transfer, state, gbuffer, camera, shadow_visibility: as in `render_frame`. height: of the image, pixels.
+        transfer, state, gbuffer, camera, shadow_visibility: as in `render_frame`. height: height of the image, pixels.
     """
     stored_scene, light = transfer.stored_scene, state.light
     buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
@@ -270,7 +273,8 @@ def shows_btf(transfer: FreeCameraTransfer, materials: MaterialState, gbuffer: G
     """Return whether any ray of a region hits a material with a BTF.
 
     Args:
-        transfer: of the bake. materials: of the look. gbuffer: of the image's rays. region: of the image.
+        transfer: transfer of the bake. materials: materials of the look. gbuffer: G-buffer of the image's rays.
+        region: region of the image.
     """
     if not materials.btf_materials.available:
         return False
@@ -318,11 +322,7 @@ def _shade(
     """
     materials, incident = state.materials, state.incident
     stored_scene = transfer.stored_scene_with(materials.overrides)
-    lobes, camera_position, (probe_mask, node_mask, rays) = (
-        materials.lobes,
-        camera.to_world[:3, 3].astype(np.float32),
-        region,
-    )
+    lobes, camera_position, (probe_mask, node_mask, rays) = materials.lobes, camera.to_world[:3, 3], region
     lobe_visibility, outgoing, gradients, node_values, light_gradient, out = buffers or (
         None,
         None,
@@ -331,26 +331,15 @@ def _shade(
         None,
         None,
     )
-    lobe_visibility = _lobe_visibility(transfer, state, camera_position, probe_mask, lobe_visibility)
+    viewed = stored_scene.viewed_from(camera_position, probe_mask)
+    lobe_visibility = _lobe_visibility(transfer, state, viewed, lobe_visibility)
     environment = _prefiltered_environment(transfer, state.light)
-    outgoing = shade_probes(
-        stored_scene, incident.total, incident.non_environment, materials.tables, camera_position, probe_mask, outgoing
-    )
-    light_sums = _highlight_light_sums(transfer, state, camera_position, probe_mask)
+    outgoing = shade_probes(viewed, incident.total, incident.non_environment, materials.tables, outgoing)
+    highlights = ProbeHighlights(lobe_visibility, _highlight_light_sums(transfer, state, viewed))
     add_environment_highlights(
-        stored_scene,
-        lobes,
-        environment,
-        camera_position,
-        lobe_visibility,
-        light_sums,
-        probe_mask,
-        outgoing,
-        is_fine=state.is_fine,
+        viewed, lobes, environment, highlights, stored_scene.normal_variation, outgoing, is_fine=state.is_fine
     )
-    gradients = gradients_along_lobe(
-        stored_scene, incident.non_environment, materials.tables, lobes, camera_position, probe_mask, gradients
-    )
+    gradients = gradients_along_lobe(viewed, incident.non_environment, materials.tables, lobes, gradients)
     probe_values = outgoing.radiance, lobe_visibility, gradients
     node_radiance, node_visibility, node_gradients = (
         interpolate_to_nodes(stored_scene, node_mask, *values) for values in zip(probe_values, node_values, strict=True)
@@ -365,7 +354,7 @@ def _shade(
     out = shade_pixels(stored_scene, gbuffer, pixel_angle, interpolated_probes, emission, mirror_data, rays, out)
     if rays is None:  # otherwise no ray hits a BTF
         footprint, texel_incident = (
-            TextureFootprint(camera_position, pixel_angle, gbuffer),
+            TextureFootprint(viewed.camera_position, pixel_angle, gbuffer),
             IncidentTexelLight(incident.total, state.texel_light),
         )
         shade_texels(
@@ -377,32 +366,24 @@ def _shade(
 
 
 def _lobe_visibility(
-    transfer: FreeCameraTransfer,
-    state: FrameRequestState,
-    camera_position: F32,
-    probe_mask: NDArray[np.uint8],
-    out: F32 | None,
+    transfer: FreeCameraTransfer, state: FrameRequestState, viewed: ViewedProbes, out: F32 | None
 ) -> F32:
     """Return the visibility of probes along their lobes. out: overwritten; None: new."""
     lobes, light = state.materials.lobes, state.light
     widths = lobe_widths(lobes) if light.has_direct_environment else ()
     if not widths:
-        return np.zeros((len(probe_mask), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
+        return np.zeros((len(viewed.material), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
     lobe_lights = transfer.lobe_lights(light.environment, widths)
-    return trace_lobe_visibility(
-        transfer.stored_scene, transfer.light_visibility_bits, lobe_lights, lobes, camera_position, probe_mask, out
-    )
+    return trace_lobe_visibility(viewed, transfer.light_visibility_bits, lobe_lights, lobes, out)
 
 
-def _highlight_light_sums(
-    transfer: FreeCameraTransfer, state: FrameRequestState, camera_position: F32, probe_mask: NDArray[np.uint8]
-) -> F32:
+def _highlight_light_sums(transfer: FreeCameraTransfer, state: FrameRequestState, viewed: ViewedProbes) -> F32:
     """Return the highlights of probes, summed over visible environment lights."""
     lobes, light = state.materials.lobes, state.light
     if not (lobes.max_ratio == 1).any() or not light.has_direct_environment:
-        return np.zeros((len(probe_mask), 3), np.float32)
+        return np.zeros((len(viewed.material), 3), np.float32)
     lights = transfer.environment_lights(light.environment, is_preview=state.is_coarse)
-    return sum_lights(transfer.stored_scene, transfer.light_visibility_bits, lights, lobes, camera_position, probe_mask)
+    return sum_lights(viewed, transfer.light_visibility_bits, lights, lobes)
 
 
 def _add_hard_shadow_lights(
@@ -457,3 +438,28 @@ def _shadow_catcher(transfer: FreeCameraTransfer, state: FrameRequestState, gbuf
     for material in np.flatnonzero(is_shadow_catcher):
         unoccluded += transfer.unoccluded(state.light, int(material), is_preview=state.is_coarse)
     return ShadowCatcher(is_shadow_catcher, interpolate_to_nodes(transfer.stored_scene, gbuffer.is_visible, unoccluded))
+
+
+@dataclass
+class PreviousImage:
+    """The last rendered image.
+
+    Attributes:
+        state: its target. gbuffer: of its rays. frame: the finished frame.
+        shadow_visibility: of hard-shadow lights along its rays. has_highlight_edges: its highlight edges are
+            antialiased.
+        rgb9e5: its pixels, encoded as RGB9_E5; None until requested.
+    """
+
+    state: FrameRequestState
+    gbuffer: GBuffer
+    frame: Frame
+    shadow_visibility: Sequence[F32]
+    has_highlight_edges: bool
+    rgb9e5: Shaped[NDArray[np.uint32], " pixels"] | None = None
+
+    def to_rgb9e5(self) -> Shaped[NDArray[np.uint32], " pixels"]:
+        """Return its pixels encoded as RGB9_E5; cached."""
+        if self.rgb9e5 is None:
+            self.rgb9e5 = pack_pixels(self.frame.image.reshape(-1, 3))
+        return self.rgb9e5

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,37 +11,37 @@ from numpy.typing import NDArray
 
 from relume.core.errors import ParameterError, ResultUnavailableError
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, check_exists, parse_pointer
-from relume.live.fixed_camera.fidelity import FidelityLabel
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, Solo, illumination_from_look, picture_gain
+from relume.live.fixed_camera.jobs import Job, Priority
 from relume.live.fixed_camera.picture import Progress
 from relume.live.fixed_camera.view_images import material_documents
+from relume.live.free_camera.adaptive_shadows import visible_fractions
 from relume.live.free_camera.background import alpha
 from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants, array_blocks, shader_constants
 from relume.live.free_camera.frame import (
     Frame,
     FrameRequestState,
     MaterialState,
+    PreviousImage,
     only_materials_differ,
     render_frame,
     shows_btf,
     update_for_materials,
 )
-from relume.live.free_camera.hard_shadows.adaptive_shadows import visible_fractions
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight
+from relume.live.free_camera.highlight_edges import render_fine_frame
+from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, find_dirty_pixels
 from relume.live.free_camera.occluded_probes import reweight
-from relume.live.free_camera.previous_frame import PreviousImage
 from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
-from relume.live.free_camera.probe_light.incident import IncidentCoefficients
-from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
-from relume.live.free_camera.probe_light.state import LightRequest, ProbeLightState
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.probe_light import LightRequest, ProbeLightState
 from relume.live.free_camera.protocol import FreeCameraTransfer
-from relume.live.free_camera.refine_job import RefineHighlights, render_fine_frame
 from relume.live.free_camera.residual_correction import apply_residual
-from relume.live.free_camera.texel_brdf.job import TablesJob
+from relume.live.free_camera.texel_brdf.texel_tables import get_texel_tables
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 from relume.views.resolve import encode_coverage, encode_pixels
 
@@ -81,8 +80,7 @@ class FreeCameraPicture:
         self._is_stale = False  # the frame is outdated: its pixels were not requested
         self._texel_light = TexelLight()
         self._residual_image: F32 | None = None  # residual that is added to the frame
-        self._is_corrected = False  # the displayed image includes the residual
-        self._is_refined = False  # the frame has been refined since it was sent
+        self._is_refined = False  # a job has refined the frame since the last step
         self.renders_pixels = True
         self._published_vectors: IncidentCoefficients | None = None
         self._vectors_version = self._materials_version = 0
@@ -105,7 +103,7 @@ class FreeCameraPicture:
         light = illumination_from_look(look, self._transfer.material_names, has_bounces=True, solo=solo)
         self._transfer.environment_map(light.environment.map)  # raises now if it is not available
         self._look, self._light, self._solo = look, light, solo
-        self._residual_image = None
+        self.correct(None)
 
     def set_camera(self, camera: Camera, size: tuple[int, int]) -> None:
         """Set the camera and the image size; nothing is computed yet.
@@ -115,7 +113,7 @@ class FreeCameraPicture:
         """
         self._camera, self._size = camera, size
         self._camera_seq += 1
-        self._residual_image = None
+        self.correct(None)
 
     def correct(self, residual_image: Shaped[F32, "height width 3"] | None) -> None:
         """Add a residual until the look or camera changes, see `relume.live.free_camera.residual_correction`.
@@ -123,6 +121,7 @@ class FreeCameraPicture:
         Args:
             residual_image: per pixel, float32; None: none.
         """
+        self._is_refined |= residual_image is not None or self.is_corrected
         self._residual_image = residual_image
 
     @property
@@ -145,19 +144,31 @@ class FreeCameraPicture:
         if isinstance(parsed, CurvePointer | ParameterPointer) and self._look is not None:
             check_exists(parsed, self._look)
 
-    def next_job(self) -> IncrementalProbeLightJob | ProbeLightJob | TablesJob | RefineHighlights | None:
+    def next_job(self) -> Job | None:
         """Return the next refinement: missing incident coefficients, then BTFs, then highlight edges."""
         if self._is_coarse and self._must_be_coarse():
             return self._probe_light.next_job(self._light_request(), self._needed_probes)
         if self._look is not None and (missing := self._material_state(self._look).btf_materials.missing):
-            return TablesJob(missing[0].data, missing[0].components, self._display_btf)
+            return self._tables_job(missing[0].data, missing[0].components)
         return self._refine_job() if self._is_watched and self.renders_pixels else None
 
-    def _display_btf(self) -> None:
-        """Display BTFs whose tables are available now."""
-        self._materials, self._displayed = (None, self._materials[1]), None
+    def _tables_job(self, data: str, components: int) -> Job:
+        """Return the job for the tables of a BTF, seconds for 128 × 128 texels; until then its mean is displayed."""
 
-    def _refine_job(self) -> RefineHighlights | None:
+        def display(tables: object) -> None:
+            self._materials, self._displayed = (None, self._materials[1]), None
+
+        return Job(
+            ("BTF tables", data, components),
+            "measured texture",
+            Priority.CONTROL,
+            lambda progress, is_canceled: get_texel_tables(data, components),
+            display,
+            state="precomputing",
+            is_resumable=True,
+        )
+
+    def _refine_job(self) -> Job | None:
         """Return the job that refines highlights in the displayed image, if they are not fine."""
         previous = self._previous
         if (
@@ -179,8 +190,12 @@ class FreeCameraPicture:
                 )
                 self._is_refined = True
 
-        return RefineHighlights(
-            partial(render_fine_frame, *args), ("finer", self._camera_seq, id(previous.state)), accept_frame
+        return Job(
+            ("highlights", self._camera_seq, id(previous.state)),
+            "finer highlights",
+            Priority.REFINEMENT,
+            lambda progress, is_canceled: render_fine_frame(*args),
+            accept_frame,
         )
 
     @property
@@ -188,17 +203,13 @@ class FreeCameraPicture:
         """The requested state; equal to `_displayed` if it is displayed."""
         return self._look, self._solo, self._camera_seq, self._probe_light.version
 
-    def install(self, job: Any, result: Any) -> None:
-        """Use the result of a job."""
-        job.install(result)
-
     def advance(self, max_coefficients: int | None) -> Progress:
         """Update the image to its look and camera."""
         target = self._target
         is_displayed = target == self._displayed and self._is_coarse == self._must_be_coarse()
-        if self._look is None or (is_displayed and self._is_corrected == self.is_corrected and not self._is_refined):
+        if self._look is None or (is_displayed and not self._is_refined):
             return Progress([], exact=False, fidelity=self._fidelity, complete=True)
-        self._is_corrected, self._is_refined = self.is_corrected, False
+        self._is_refined = False
         if not is_displayed:
             self._is_coarse = self._must_be_coarse()
             self._is_stale, self._displayed = True, target
@@ -207,8 +218,8 @@ class FreeCameraPicture:
         return Progress(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
 
     @property
-    def _fidelity(self) -> FidelityLabel:
-        return "preview" if self._is_coarse else "approximate"
+    def _fidelity(self) -> Fidelity:
+        return Fidelity.PREVIEW if self._is_coarse else Fidelity.APPROXIMATE
 
     def _must_be_coarse(self) -> bool:
         """Return whether a user would wait for incident coefficients that are not cached."""

@@ -9,7 +9,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import schlick
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
 from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.camera_rays import Hits, trace_rays
@@ -34,7 +34,7 @@ def trace_glass(embree: EmbreeScene, camera_position: Shaped[F32, " 3"], directi
     """Return the first hits of camera rays including glass; None if the scene has no glass.
 
     Args:
-        embree: the triangles. camera_position: origin of the rays. directions: of the rays, unit.
+        embree: the triangles. camera_position: origin of the rays. directions: directions of the rays, unit.
     """
     alpha_test = embree.alpha_test
     if alpha_test is None or not (alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE).any():
@@ -48,7 +48,8 @@ def find_glass_layers(
     """Return the glass in front of rays.
 
     Args:
-        embree: the triangles. stored_scene: the scene. glass_hits: from `trace_glass`. directions: of the rays.
+        embree: the triangles. stored_scene: the scene. glass_hits: from `trace_glass`.
+        directions: directions of the rays.
     """
     assert embree.alpha_test is not None
     cutouts = embree.alpha_test.alpha_masks
@@ -67,7 +68,7 @@ def composite_glass(glass: GlassLayers, values: Shaped[F32, " rows *channels"]) 
     """Composite glass over the light behind it: attenuate that light and add the reflection of the glass.
 
     Args:
-        glass: in front of some rays. values: of the rays, then of the glass; overwritten.
+        glass: in front of some rays. values: values of the rays, then of the glass; overwritten.
     Returns:
         The values of the rays.
     """
@@ -78,7 +79,7 @@ def composite_glass(glass: GlassLayers, values: Shaped[F32, " rows *channels"]) 
 
 
 def adjust_alpha(glass: GlassLayers, coverage: Shaped[F32, " rows"]) -> Shaped[F32, " rays"]:
-    """Return the coverage of rays including glass. coverage: of the rays, then of the glass."""
+    """Return the coverage of rays including glass. coverage: that of the rays, then that of the glass."""
     out = coverage[: len(coverage) - len(glass.ray)]
     out[glass.ray] = 1 - (1 - out[glass.ray]) * glass.transmittance.mean(axis=1)
     return out

@@ -14,7 +14,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
-from relume.live.free_camera.frame import Frame, FrameRequestState, finish_rays
+from relume.live.free_camera.frame import Frame, FrameRequestState, finish_rays, render_frame
 from relume.live.free_camera.occluded_probes import reweight
 from relume.live.free_camera.primary_visibility import GBuffer, trace_through_glass
 from relume.live.free_camera.protocol import FreeCameraTransfer
@@ -97,3 +97,21 @@ def add_samples(
         coverage = coverage.copy()
         coverage.reshape(-1)[pixels] = final_frame.coverage.reshape(-1, _RAYS_PER_PIXEL).mean(axis=1)
     return frame._replace(image=image, coverage=coverage)
+
+
+def render_fine_frame(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    shadow_visibility: Sequence[F32],
+) -> Frame:
+    """Render the frame with anti-aliased highlight edges.
+
+    Args:
+        transfer, state, gbuffer, camera, size, shadow_visibility: as in `relume.live.free_camera.frame.render_frame`;
+            `state` is fine.
+    """
+    frame = render_frame(transfer, state, gbuffer, camera, size, shadow_visibility)
+    return add_samples(transfer, state, gbuffer, camera, frame, shadow_visibility)

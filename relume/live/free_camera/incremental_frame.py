@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.views.resolve import pack_rgb9e5
 
 F32 = NDArray[np.float32]
@@ -40,7 +40,7 @@ class DirtyPixels(NamedTuple):
 
     Attributes:
         pixels: pixels with any of its rays.
-        first_extra_ray: of each, index of its first extra ray.
+        first_extra_ray: index of the first extra ray of each.
     """
 
     region: DirtyRegion
@@ -58,8 +58,13 @@ def _mark_nodes(lattice_nodes, is_visible, probe_mask, out):  # type: ignore[no-
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _mark_rays(material, is_changed, node_mask, face, lattice_node, weight, owner, out, pixel_mask):  # type: ignore[no-untyped-def]
-    num_pixels = pixel_mask.shape[0]
+def _mark_rays(material, is_changed, node_mask, gbuffer, out, pixel_mask):  # type: ignore[no-untyped-def]
+    face, lattice_node, weight, num_pixels = (
+        gbuffer.hits.face,
+        gbuffer.lattice_node,
+        gbuffer.weight,
+        pixel_mask.shape[0],
+    )
     for r in range(face.shape[0]):
         if face[r] < 0:
             continue
@@ -68,7 +73,7 @@ def _mark_rays(material, is_changed, node_mask, face, lattice_node, weight, owne
             is_dirty |= weight[r, k] != 0 and node_mask[lattice_node[r, k]] != 0
         if is_dirty:
             out[r] = 1
-            pixel_mask[r if r < num_pixels else owner[r - num_pixels]] = 1
+            pixel_mask[r if r < num_pixels else gbuffer.owner[r - num_pixels]] = 1
 
 
 def find_dirty_pixels(
@@ -77,17 +82,14 @@ def find_dirty_pixels(
     """Return the pixels that show some materials.
 
     Args:
-        stored_scene: the scene. gbuffer: of the image's rays, without glass.
-        is_changed: the materials. num_pixels: of the image.
+        stored_scene: the scene. gbuffer: G-buffer of the image's rays, without glass.
+        is_changed: the materials. num_pixels: number of pixels of the image.
     """
     probe_mask = (gbuffer.is_needed & is_changed[stored_scene.material]).astype(np.uint8)
     node_mask, ray_mask = np.zeros_like(gbuffer.is_visible), np.zeros(len(gbuffer.directions), np.bool_)
     _mark_nodes(stored_scene.lattice_nodes, gbuffer.is_visible, probe_mask, node_mask)
-    pixel_mask, ray_arrays = (
-        np.zeros(num_pixels, np.bool_),
-        (gbuffer.hits.face, gbuffer.lattice_node, gbuffer.weight, gbuffer.owner),
-    )
-    _mark_rays(stored_scene.face_material, is_changed, node_mask, *ray_arrays, ray_mask, pixel_mask)
+    pixel_mask = np.zeros(num_pixels, np.bool_)
+    _mark_rays(stored_scene.face_material, is_changed, node_mask, gbuffer, ray_mask, pixel_mask)
     region = DirtyRegion(probe_mask, node_mask, np.flatnonzero(ray_mask).astype(np.int32))
     pixels = np.flatnonzero(pixel_mask).astype(np.int32)
     return DirtyPixels(region, pixels, np.searchsorted(gbuffer.owner, pixels))
@@ -120,7 +122,7 @@ def resolve_subset(
     """Average all rays of some pixels; see `relume.live.free_camera.antialiasing.resolve` for all pixels.
 
     Args:
-        radiance: of the rays through all pixel centers, then of the extra rays.
+        radiance: radiance of the rays through all pixel centers, then of the extra rays.
         owner: pixels of the extra rays, ascending. dirty: the pixels to resolve.
         out: radiance, float32, written there. rgb9e5: the same, packed.
     """

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numba as nb
 import numpy as np
@@ -23,9 +22,9 @@ from numpy.typing import NDArray
 from relume.core.color import LUMINANCE
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.texture_kernels import sample_texture
-from relume.math.zernike import project
+from relume.live.free_camera.texture_kernels import sample_texture
+from relume.math.zernike import basis_functions
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -45,7 +44,7 @@ def basis_gradients() -> Shaped[F32, "3 K"]:
     wi[..., 2] = np.cos(theta)[:, None]
     # the basis is orthonormal in dx dy = cos θ dω, so x / z leaves x dω
     solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NUM_QUADRATURE_NODES)
-    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, project(wi), solid_angle), np.float32)
+    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, basis_functions(wi), solid_angle), np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -97,13 +96,14 @@ def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outw
 
     Args:
         textures: all of them. texture: index of the map. texture_uv, footprint: u and v, and see `sample_texture`.
-        n: the normal, unit. t: tangent, not yet orthogonal to it. handedness: of the bitangent; its sign counts.
+        n: the normal, unit. t: tangent, not yet orthogonal to it.
+        handedness: handedness of the bitangent; its sign counts.
         outward: the face normal on the visible side. scratch: (3,)
     Returns:
         The unit normal; n itself if the mapped normal points below the face.
     """
     sample_texture(textures, texture, texture_uv[0], texture_uv[1], footprint, scratch)
-    tangent_dot_normal: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
+    tangent_dot_normal = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
     tx, ty, tz = normalize(
         (t[0] - tangent_dot_normal * n[0], t[1] - tangent_dot_normal * n[1], t[2] - tangent_dot_normal * n[2])
     )
@@ -123,6 +123,6 @@ def shading_ratio(gradient, n, perturbed):  # type: ignore[no-untyped-def]
     Args:
         gradient: D, a tuple of three. n: the surface's normal. perturbed: n', the perturbed normal.
     """
-    irradiance: Any = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
-    perturbed_irradiance: Any = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]
+    irradiance = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
+    perturbed_irradiance = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]
     return min(max(perturbed_irradiance, np.float32(0)) / max(irradiance, _EPSILON), _MAX_RATIO)

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid, node_index
 from relume.live.free_camera.ray_scene import OcclusionMesh
-from relume.raytrace.embree import occluded, packet_arguments
+from relume.probes.triangle_grids import ProbeGrid, node_index
 from relume.raytrace.ray_packet import (
     LANES,
     enable_first_lanes,
@@ -69,19 +68,19 @@ def _aim_between(packet, lane, start, end):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _flush(occluded, packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no-untyped-def]
+def _flush(packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no-untyped-def]
     """Trace the first lanes, and mark both ends of occluded ones. ends: nodes. (`LANES`, 2)"""
     enable_first_lanes(packet, num_pending)
-    trace_shadows(occluded, packet)
+    trace_shadows(packet)
     for lane in range(num_pending):
         if not is_unoccluded(packet, lane):
             has_occluded_neighbor[ends[lane, 0]] = has_occluded_neighbor[ends[lane, 1]] = 1
 
 
 @nb.njit(nogil=True, cache=True)
-def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occluded_neighbor):  # type: ignore[no-untyped-def]
+def _mark_occluded(tracer, geometry, start, stop, has_occluded_neighbor):  # type: ignore[no-untyped-def]
     """Trace along all edges of the grids of faces [start, stop)."""
-    packet, ends, num_pending = new_packet(scene, arguments), np.empty((LANES, 2), np.uint32), 0
+    packet, ends, num_pending = new_packet(tracer), np.empty((LANES, 2), np.uint32), 0
     origin, target = np.empty(3, np.float32), np.empty(3, np.float32)
     for f in range(start, stop):
         for side in range(2):
@@ -101,17 +100,17 @@ def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occlud
                         ends[num_pending, 1] = geometry.probe_grid.node_index[first + node_index(num_rows, i1, j1)]
                         num_pending += 1
                         if num_pending == LANES:
-                            _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
+                            _flush(packet, num_pending, ends, has_occluded_neighbor)
                             num_pending = 0
     if num_pending:
-        _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
+        _flush(packet, num_pending, ends, has_occluded_neighbor)
 
 
 def find_occluded_probes(mesh: OcclusionMesh) -> Shaped[NDArray[np.uint8], " nodes"]:
     """Return nonzero for lattice nodes that are occluded from a neighbor in the grid of a face."""
-    stored_scene, arguments = mesh.stored_scene, packet_arguments(coherent=True)
+    stored_scene = mesh.stored_scene
     has_occluded_neighbor = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
-    args = occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh)
+    args = mesh.embree.shadow_tracer(coherent=True), _grid_geometry(mesh)
     # threads may mark a node twice
     for_ranges(
         lambda start, stop: _mark_occluded(*args, start, stop, has_occluded_neighbor),
@@ -141,11 +140,10 @@ def _grid_triangle(num_rows, u, v):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _reweight(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, geometry, has_occluded_neighbor, face, uv, directions, lattice_node, start, stop, weight
-):
+def _reweight(tracer, geometry, has_occluded_neighbor, gbuffer, start, stop):  # type: ignore[no-untyped-def]
     """Trace to the nodes of rays [start, stop) that have a node with an occluded neighbor."""
-    packet, num_pending = new_packet(scene, arguments), 0
+    packet, num_pending, (face, uv, _), directions = new_packet(tracer), 0, gbuffer.hits, gbuffer.directions
+    lattice_node, weight = gbuffer.lattice_node, gbuffer.weight
     origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.face_normal
     for p in range(start, stop):
         f = face[p]
@@ -173,17 +171,17 @@ def _reweight(  # type: ignore[no-untyped-def]
         packet.owner[num_pending] = p
         num_pending += 1
         if num_pending == _RAYS_PER_PACKET:
-            _reweight_traced(occluded, packet, num_pending, weight)
+            _reweight_traced(packet, num_pending, weight)
             num_pending = 0
     if num_pending:
-        _reweight_traced(occluded, packet, num_pending, weight)
+        _reweight_traced(packet, num_pending, weight)
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _reweight_traced(occluded, packet, num_pending, weight):  # type: ignore[no-untyped-def]
+def _reweight_traced(packet, num_pending, weight):  # type: ignore[no-untyped-def]
     """Trace three lanes for each pending ray; weights of occluded nodes become zero."""
     enable_first_lanes(packet, 3 * num_pending)
-    trace_shadows(occluded, packet)
+    trace_shadows(packet)
     for r in range(num_pending):
         p, total = packet.owner[r], np.float32(0)
         for k in range(3):
@@ -202,10 +200,5 @@ def reweight(gbuffer: GBuffer, has_occluded_neighbor: Shaped[NDArray[np.uint8], 
     """
     if not has_occluded_neighbor.any():
         return
-    arguments, hits = packet_arguments(coherent=False), gbuffer.hits
-    args = (
-        occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh), has_occluded_neighbor, hits.face,
-        hits.uv,
-        gbuffer.directions, gbuffer.lattice_node,
-    )  # fmt: skip
-    parallel_for_chunks(lambda start, stop: _reweight(*args, start, stop, gbuffer.weight), len(hits.face))
+    args = mesh.embree.shadow_tracer(coherent=False), _grid_geometry(mesh), has_occluded_neighbor, gbuffer
+    parallel_for_chunks(lambda start, stop: _reweight(*args, start, stop), len(gbuffer.directions))

@@ -14,8 +14,8 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, find_edges, samples_per_edge
 from relume.live.free_camera.glass import GlassLayers, find_glass_layers, trace_glass
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.triangle_grids import surrounding_nodes
+from relume.probes.stored_scene import StoredScene
+from relume.probes.triangle_grids import surrounding_nodes
 from relume.raytrace.alpha_filter import IGNORE_GLASS, STOP_AT_OPAQUE
 from relume.raytrace.camera_rays import Hits, trace_rays
 from relume.raytrace.embree import EmbreeScene
@@ -31,9 +31,9 @@ class GBuffer(NamedTuple):
     """Surfaces along camera rays: one ray per pixel center in row-major order, then extra rays on edges, then glass.
 
     Attributes:
-        hits: of the rays. directions: of the rays, unit.
+        hits: hits of the rays. directions: directions of the rays, unit.
         owner: pixel of each extra ray.
-        lattice_node: the three nodes around each hit. weight: of each; zero if the hit has none.
+        lattice_node: the three nodes around each hit. weight: weight of each; zero if the hit has none.
         glass: in front of rays; its own hits come after all others.
         is_visible: nonzero for lattice nodes around any hit.
         is_needed: nonzero for probes that visible nodes interpolate.
@@ -49,7 +49,7 @@ class GBuffer(NamedTuple):
     is_needed: Shaped[NDArray[np.uint8], " probes"]
 
     def pixel_centers(self, num_pixels: int) -> GBuffer:
-        """Return only the rays through pixel centers, behind glass. num_pixels: of the image"""
+        """Return only the rays through pixel centers, behind glass. num_pixels: number of pixels of the image"""
         rows = slice(0, num_pixels)
         return self._replace(
             hits=self.hits.rows(rows), directions=self.directions[rows], owner=self.owner[:0],
@@ -81,8 +81,9 @@ def _aim(rotation, half_width, half_height, width, height, pixels, offsets, star
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
+def _find_nodes(probe_grid, face_normal, hits, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
     """Find the lattice nodes around hits [start, stop); a side without nodes uses those of the other side."""
+    face, uv, _ = hits
     for p in range(start, stop):
         f = face[p]
         weight[p, 0] = weight[p, 1] = weight[p, 2] = 0
@@ -113,7 +114,7 @@ def trace_primary(stored_scene: StoredScene, embree: EmbreeScene, camera: Camera
     """Trace the camera rays of an image.
 
     Args:
-        stored_scene: the scene. embree: its triangles. camera: of the image. size: width and height in pixels.
+        stored_scene: the scene. embree: its triangles. camera: camera of the image. size: width and height in pixels.
     """
     num_pixels, camera_position = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
     directions = _directions(camera, size, np.arange(num_pixels, dtype=np.int32), _PIXEL_CENTER)
@@ -149,7 +150,7 @@ def trace_through_glass(
 
     Args:
         stored_scene, embree, camera, size: as in `trace_primary`.
-        pixels: the pixels. offsets: of rays in each pixel, pixel units.
+        pixels: the pixels. offsets: offsets of rays in each pixel, pixel units.
     Returns:
         k rays for each pixel in succession, as if each ray were a pixel.
     """
@@ -178,7 +179,7 @@ def _make_gbuffer(
     num_rays = len(directions)
     lattice_node, weight = np.zeros((num_rays, 3), np.uint32), np.empty((num_rays, 3), np.float32)
     is_visible = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
-    args = (stored_scene.probe_grid, stored_scene.face_normal, hits.face, hits.uv, directions)
+    args = stored_scene.probe_grid, stored_scene.face_normal, hits, directions
     parallel_for_chunks(lambda start, stop: _find_nodes(*args, start, stop, lattice_node, weight, is_visible), num_rays)
     is_needed = np.zeros(stored_scene.probes.num_points, np.uint8)
     mark_needed_probes(stored_scene.lattice_nodes, is_visible, is_needed)
@@ -232,7 +233,7 @@ def interpolate_to_nodes(
 
     Args:
         stored_scene: the scene. is_visible: nonzero for nodes to evaluate.
-        values: of probes. out: overwritten there; None: new, zero elsewhere.
+        values: values of probes. out: overwritten there; None: new, zero elsewhere.
     """
     flat = values.reshape(len(values), -1)
     node_values = np.zeros((len(is_visible), *values.shape[1:]), np.float32) if out is None else out

@@ -1,4 +1,4 @@
-"""Protocol of an opened bake with a free camera; `relume.methods.free_camera_transfer` implements it."""
+"""Protocol of an opened bake with a free camera; `relume.live.opened.free_camera_transfer` implements it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import OpenBake
 from relume.live.free_camera.environment_lookup import EnvironmentLookup
 from relume.live.free_camera.free_view import FreeView
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.texture_overrides import ProbeMapOverrides
 from relume.live.free_camera.ray_scene import OcclusionMesh
+from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import EnvironmentKey
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.embree import EmbreeScene
 
 F32 = NDArray[np.float32]

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.barycentric import EDGE_OFFSET_FRACTION, min_barycentrics
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.scene_buffers import offset_point
+from relume.raytrace.scene_buffers import ray_epsilon
 
 F32 = NDArray[np.float32]
 
@@ -20,8 +20,9 @@ class OcclusionMesh(NamedTuple):
     """Triangles, their search tree, and offsets of ray origins.
 
     Attributes:
-        stored_scene: of the mesh. positions: of triangle corners, meters. embree: search tree.
-        surface_offset: of ray origins, meters. edge_offset: least barycentric coordinates of ray origins, as in
+        stored_scene: stored scene of the mesh. positions: positions of triangle corners, meters. embree: search tree.
+        surface_offset: offset of ray origins, meters.
+        edge_offset: least barycentric coordinates of ray origins, as in
             `relume.raytrace.surface_interaction`.
     """
 
@@ -36,9 +37,9 @@ class OcclusionMesh(NamedTuple):
         """Compute the offsets.
 
         Args:
-            stored_scene: of the mesh. positions: of its corners. embree: its search tree.
+            stored_scene: stored scene of the mesh. positions: positions of its corners. embree: its search tree.
         """
-        surface_offset, corners = offset_point(positions), positions[stored_scene.faces]
+        surface_offset, corners = ray_epsilon(positions), positions[stored_scene.faces]
         twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         return cls(
             stored_scene,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
@@ -37,7 +37,8 @@ class CorrectionSamples(NamedTuple):
     """Hits of the rays through pixel centers, row by row.
 
     Attributes:
-        position: undefined for rays that miss. normal: of the triangle. material: −1 for rays that miss. width: of the
+        position: undefined for rays that miss. normal: normal of the triangle. material: −1 for rays that miss.
+        width: width of the
             image, pixels.
     """
 
@@ -51,7 +52,8 @@ class CorrectionSamples(NamedTuple):
         """Collect the hits.
 
         Args:
-            stored_scene: that is hit. gbuffer: of rays through pixel centers only. camera: of the rays. width: pixels.
+            stored_scene: that is hit. gbuffer: G-buffer of rays through pixel centers only. camera: camera of the rays.
+            width: pixels.
         """
         face, is_hit = np.maximum(gbuffer.hits.face, 0), gbuffer.hits.face >= 0
         distance = np.where(is_hit, gbuffer.hits.distance, 0)[:, None]
@@ -87,7 +89,7 @@ def residual(
 
     Args:
         radiance: M at the samples. exact: E there. samples: pixels of a smaller image from the same camera.
-        pixels: of the free-camera image.
+        pixels: pixels of the free-camera image.
     Returns:
         β Σ w D, to be added to the image.
     """

@@ -22,8 +22,8 @@ from relume.live.free_camera.highlights.environment_lobe_lookup import (
 )
 from relume.live.free_camera.normal_mapping import normal_tilt, normalize, shading_ratio
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import EMISSION, NORMAL_MAP, StoredScene
-from relume.live.free_camera.probes.texture_kernels import sample_texture
+from relume.live.free_camera.texture_kernels import sample_texture
+from relume.probes.stored_scene import EMISSION, NORMAL_MAP, StoredScene
 
 F32 = NDArray[np.float32]
 
@@ -40,9 +40,10 @@ class MirrorData(NamedTuple):
     """Radiance of reflection lobes.
 
     Attributes:
-        lobes: of all materials. environment: prefiltered.
-        lobe_visibility: of lattice nodes along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
-        gradients: of lattice nodes, from `relume.live.free_camera.highlights.lobe_gradients`.
+        lobes: lobes of all materials. environment: prefiltered.
+        lobe_visibility: lobe visibility of lattice nodes along their lobes, from
+            `relume.live.free_camera.highlights.lobe_visibility`.
+        gradients: gradients of lattice nodes, from `relume.live.free_camera.highlights.lobe_gradients`.
         is_fine: use two lobes for every highlight, as at probes, not only for those that need it.
     """
 
@@ -58,7 +59,7 @@ def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
     """Interpolate vectors between the three lattice nodes of a pixel.
 
     Args:
-        values: of all nodes. (nodes, 3). lattice_node: the three, a tuple. weight: of each, a tuple.
+        values: values of all nodes. (nodes, 3). lattice_node: the three, a tuple. weight: weight of each, a tuple.
     """
     x = y = z = np.float32(0)
     for k in range(3):
@@ -133,7 +134,8 @@ def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: igno
     """Return the change of incident luminance between the pixel's lobe and the interpolated ones, for unit albedo.
 
     Args:
-        gradients: of all nodes. (nodes, 4). lattice_node, weight, direction: of the pixel, see `shade_pixels`.
+        gradients: gradients of all nodes. (nodes, 4).
+        lattice_node, weight, direction: lattice node, weight and direction of the pixel, see `shade_pixels`.
         n: interpolated normal, before normal mapping.
     """
     x, y, z = blend(gradients, lattice_node, weight)
@@ -150,7 +152,8 @@ def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Return the texture coordinates of a point in a triangle.
 
     Args:
-        uvs: of all corners. (corners, 2). corners: the triangle's three, a tuple. uv: barycentric, of the last two
+        uvs: UV coordinates of all corners. (corners, 2). corners: the triangle's three, a tuple.
+        uv: barycentric, of the last two
             corners.
     """
     a, b, c = corners
@@ -164,7 +167,7 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 
     Args:
         distance: to the camera, meters. pixel_angle: angle of a pixel, radians.
-        uv_scale: texture units per meter of the surface. cosine: of the view angle, of either sign.
+        uv_scale: texture units per meter of the surface. cosine: cosine of the view angle, of either sign.
     """
     return distance * pixel_angle * uv_scale / math.sqrt(max(abs(cosine), _MIN_SLANT))
 
@@ -173,7 +176,9 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 def _perturbed_normal(  # type: ignore[no-untyped-def]
     textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
 ):
-    """Apply the normal map to the normal n of a pixel. outward: of the face. is_back_face: the ray hits its back."""
+    """Apply the normal map to the normal n of a pixel. outward: outward of the face. is_back_face: the ray hits its
+    back.
+    """
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
     side = np.float32(-1) if is_back_face else np.float32(1)
@@ -187,14 +192,11 @@ def _perturbed_normal(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _shade_pixels(  # type: ignore[no-untyped-def]
-    scene_arrays, pixel_angle, hits, directions, lattice_node, weight, node_radiance, is_reflective, light_gradient,
-    emission, mirror_data, rows,
-    start, stop, out,
-):  # fmt: skip
+def _shade_pixels(scene, pixel_angle, gbuffer, probes, emission, mirror_data, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the radiance of nodes and lobes, and emission, along rays rows[start:stop]."""
-    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene_arrays
-    face, uv, distance = hits
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene
+    (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
+    node_radiance, is_reflective, light_gradient = probes
     lobes = mirror_data.lobes
     texture_value, light, radiance = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     for r in range(start, stop):
@@ -296,22 +298,14 @@ def shade_pixels(
     """Compute the radiance along rays; zero for rays that miss.
 
     Args:
-        stored_scene: that is hit. gbuffer: of the rays. pixel_angle: angle of a pixel, radians.
+        stored_scene: that is hit. gbuffer: G-buffer of the rays. pixel_angle: angle of a pixel, radians.
         interpolated_probes: at all lattice nodes. emission: mean emitted radiance of each material.
         mirror_data: radiance of lobes, added. rows: rays to shade; None: all. out: written; None: a new array.
     """
     radiance = np.empty((len(gbuffer.directions), 3), np.float32) if out is None else out
     ray_indices = np.arange(len(radiance), dtype=np.int32) if rows is None else rows
-    hits = (gbuffer.hits.face, gbuffer.hits.uv, gbuffer.hits.distance)
-    scene_arrays = (
-        stored_scene.textures, stored_scene.uvs, stored_scene.tangents, stored_scene.faces, stored_scene.uv_faces,
-        stored_scene.face_material,
-        stored_scene.face_normal, stored_scene.uv_scale, stored_scene.lattice_nodes.normal,
-    )  # fmt: skip
-    args = (
-        scene_arrays, np.float32(pixel_angle), hits, gbuffer.directions, gbuffer.lattice_node, gbuffer.weight,
-        *interpolated_probes, emission, mirror_data, ray_indices,
-    )  # fmt: skip
+    scene_args = stored_scene.pixel_arrays(), np.float32(pixel_angle), gbuffer
+    args = *scene_args, interpolated_probes, emission, mirror_data, ray_indices
     parallel_for_chunks(
         lambda start, stop: _shade_pixels(*args, start, stop, radiance), len(ray_indices), _CHUNKS_PER_THREAD
     )

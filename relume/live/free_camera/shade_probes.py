@@ -21,38 +21,28 @@ from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS
 from relume.live.free_camera.basis.table_index import view_direction_local
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.math.zernike import recurrence
+from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
-# One function: arrays handed to others, even inlined ones, would be reference-counted at every probe.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _shade_probes(  # type: ignore[no-untyped-def]
-    recurrence_table,
-    probes,
-    material,
-    vectors,
-    non_environment,
-    tables,
-    camera_position,
-    rows,
-    start,
-    stop,
-    out,
-    environment,
-):
-    """Shade probes rows[start:stop]. out, environment: (probes, groups, 3), written"""
-    position, normal, tangent, _, _ = probes
-    num_groups, num_basis = out.shape[1], recurrence_table.order.shape[0]
-    rotated_light, outgoing = np.empty((3, num_basis), np.float32), np.empty((num_groups, 3), np.float32)
-    for p in rows[start:stop]:
-        row, fraction, cosine_phi, sine_phi = view_direction_local(position[p], normal[p], tangent[p], camera_position)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _shade_probes(recurrence_table, viewed, vectors, non_environment, tables, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Shade probes rows[start:stop].
+
+    Args:
+        viewed, vectors, non_environment, tables: of `shade_probes`. scratch: (3, entries), (groups, 3)
+        out: `ProbeRadiance`, written.
+    """
+    material, (radiance, environment), (rotated_light, outgoing) = viewed.material, out, scratch
+    num_groups, num_basis = outgoing.shape[0], rotated_light.shape[1]
+    for p in viewed.rows[start:stop]:
+        view_coordinates = row, fraction, cosine_phi, sine_phi = view_direction_local(viewed, p)
         for group in range(num_groups):
             for channel in range(3):
-                out[p, group, channel] = environment[p, group, channel] = 0
+                radiance[p, group, channel] = environment[p, group, channel] = 0
         for kind in range(0, 6 if non_environment.shape[0] > 0 else 2, 2):
             is_isotropic = is_anisotropic = False
             for group in range(num_groups):
@@ -96,30 +86,19 @@ def _shade_probes(  # type: ignore[no-untyped-def]
                             ) * rotated_light[channel, basis_index]
                         outgoing[group, channel] = total
             if is_anisotropic:  # a function of its own: with its loop here, the one above is four times slower
-                view_coordinates = row, fraction, cosine_phi, sine_phi
-                _add_anisotropic(
-                    tables.anisotropic,
-                    tables.table_index,
-                    material[p],
-                    kind,
-                    view_coordinates,
-                    vectors,
-                    non_environment,
-                    p,
-                    outgoing,
-                )
+                _add_anisotropic(tables, material[p], kind, view_coordinates, vectors[p], non_environment, p, outgoing)
             for group in range(num_groups):
                 for channel in range(3):
                     if kind == 0:
-                        out[p, group, channel] = outgoing[group, channel]
+                        radiance[p, group, channel] = outgoing[group, channel]
                     elif kind == 2:
                         environment[p, group, channel] = outgoing[group, channel]
                     else:  # clamped: negative ringing would darken the environment's highlight
-                        out[p, group, channel] += max(outgoing[group, channel], np.float32(0))
+                        radiance[p, group, channel] += max(outgoing[group, channel], np.float32(0))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _add_anisotropic(tables, table_index, material, kind, view_coordinates, vectors, non_environment, p, out):  # type: ignore[no-untyped-def]
+def _add_anisotropic(tables, material, kind, view_coordinates, vectors, non_environment, p, out):  # type: ignore[no-untyped-def]
     """Add the products of probe p's coefficients with tables over θo and φo. out: (groups, 3)"""
     row, fraction, cosine_phi, sine_phi = view_coordinates
     azimuth = math.atan2(sine_phi, cosine_phi) / (np.float32(2) * np.float32(math.pi))
@@ -127,17 +106,17 @@ def _add_anisotropic(tables, table_index, material, kind, view_coordinates, vect
     column: Any = min(np.int64(column_coordinate), NUM_COLUMNS - 1)
     next_column, column_fraction = (column + 1) % NUM_COLUMNS, np.float32(column_coordinate - column)
     for group in range(out.shape[0]):
-        if table_index[material, group, kind + 1] < 0:
+        if tables.table_index[material, group, kind + 1] < 0:
             continue
-        table = tables[table_index[material, group, kind + 1]]
+        table = tables.anisotropic[tables.table_index[material, group, kind + 1]]
         for channel in range(3):
             total = np.float32(0)
-            for k in range(vectors.shape[2]):
+            for k in range(vectors.shape[1]):
                 lower = table[row, column, channel, k]
                 lower += column_fraction * (table[row, next_column, channel, k] - lower)
                 upper = table[row + 1, column, channel, k]
                 upper += column_fraction * (table[row + 1, next_column, channel, k] - upper)
-                light = vectors[p, channel, k] if kind < 4 else non_environment[p, channel, k]
+                light = vectors[channel, k] if kind < 4 else non_environment[p, channel, k]
                 if kind == 2:
                     light -= non_environment[p, channel, k]
                 total += (lower + fraction * (upper - lower)) * light
@@ -157,34 +136,29 @@ class ProbeRadiance(NamedTuple):
 
 
 def shade_probes(
-    stored_scene: StoredScene,
+    viewed: ViewedProbes,
     vectors: Shaped[F32, "probes 3 functions"],
     non_environment: Shaped[F32, "probes 3 functions"] | None,
     tables: Tables,
-    camera_position: Shaped[F32, " 3"],
-    is_needed: Shaped[NDArray[np.uint8], " probes"],
     out: ProbeRadiance | None = None,
 ) -> ProbeRadiance:
     """Compute the radiance that probes reflect toward the camera.
 
     Args:
-        stored_scene: has the probes. vectors: incident radiance coefficients t.
+        viewed: the probes to shade. vectors: incident radiance coefficients t of all probes.
         non_environment: t of all light except the environment itself, for terms with a highlight; None: it is zero.
-        tables: outgoing coefficients of all materials. camera_position: meters. is_needed: nonzero for probes to shade.
+        tables: outgoing coefficients of all materials.
         out: written for these; None: new, zero elsewhere.
     """
     shape = len(vectors), NUM_GROUPS, 3
     outgoing = ProbeRadiance(np.zeros(shape, np.float32), np.zeros(shape, np.float32)) if out is None else out
-    rows = np.flatnonzero(is_needed.view(np.bool_))
-    args = (
-        recurrence(),
-        stored_scene.probes,
-        stored_scene.material,
-        vectors,
-        np.empty((0, *vectors.shape[1:]), np.float32) if non_environment is None else non_environment,
-        tables,
-        np.ascontiguousarray(camera_position, np.float32),
-        rows,
-    )
-    parallel_for_chunks(lambda start, stop: _shade_probes(*args, start, stop, *outgoing), len(rows))
+    table = recurrence()
+    other = np.empty((0, *vectors.shape[1:]), np.float32) if non_environment is None else non_environment
+    args = table, viewed, vectors, other, tables
+
+    def shade(start: int, stop: int) -> None:
+        scratch = np.empty((3, len(table.order)), np.float32), np.empty((NUM_GROUPS, 3), np.float32)
+        _shade_probes(*args, start, stop, scratch, outgoing)
+
+    parallel_for_chunks(shade, len(viewed.rows))
     return outgoing

@@ -27,7 +27,8 @@ class Preset:
     """One material of the library under one model.
 
     Attributes:
-        id: "table/material". model: of the highlight. group: metal, plastic, paint, fabric, wood, stone or rubber.
+        id: "table/material". model: model of the highlight.
+        group: metal, plastic, paint, fabric, wood, stone or rubber.
         swatch: color under uniform light, "#rrggbb". terms: as in a look.
     """
 

@@ -30,7 +30,7 @@ class NavigationMap:
 
     Attributes:
         f0: reflectance at normal incidence. sigma: roughness of the highlight.
-        triangles: indices of presets, counter-clockwise in (f0, log σ).
+        triangles: indices of presets, counterclockwise in (f0, log σ).
     """
 
     presets: tuple[Preset, ...]

@@ -24,7 +24,7 @@ def path_on_map(start: Terms, end: Terms, interpolated: Terms, weight: float) ->
     colors there, so that the path starts and ends at the given materials.
 
     Args:
-        start, end: terms of complete looks. interpolated: their parameter-wise interpolation. weight: of `end`.
+        start, end: terms of complete looks. interpolated: interpolation of their parameters. weight: weight of `end`.
     Returns:
         Terms like `interpolated`; unchanged `interpolated` if an end is not a diffuse plus a Cook–Torrance term.
     """

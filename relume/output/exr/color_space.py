@@ -22,9 +22,9 @@ class ExportColorSpace:
     """A linear color space.
 
     Attributes:
-        name: for users.
+        name: name for users.
         interop: id in files; None if it has none.
-        chromaticities: of its primaries and white.
+        chromaticities: chromaticities of its primaries and white.
         convert: converts linear Rec. 709 to it, in place, (n, 3); None for linear Rec. 709.
     """
 
@@ -55,12 +55,13 @@ def find_space(name: str | None) -> ExportColorSpace:
         return REC_709_SPACE
     config = get_config()
     if config is None:
-        raise ParameterError("color_space", name, "none: there is no OpenColorIO config here (RELUME_OCIO)")
+        allowed = "no color space, because there is no OpenColorIO config here (RELUME_OCIO)"
+        raise ParameterError("color_space", name, allowed)
     canonical_name = config.canonical_space(name)
     try:
         matrix = config.primaries(canonical_name)
         interop = interop_id(matrix)
         chromaticities = chromaticities_from_matrix(matrix) if interop is None else INTEROP_SPACES[interop]
     except (ValueError, np.linalg.LinAlgError) as error:
-        raise ParameterError("color_space", name, f"another: {error}") from None
+        raise ParameterError("color_space", name, f"another color space, because {error}") from None
     return ExportColorSpace(canonical_name, interop, chromaticities, partial(config.convert, space=canonical_name))

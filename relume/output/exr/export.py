@@ -32,13 +32,13 @@ def export_exr(
     """Render a look and its layers sequentially, and write them; no more than one image is in memory.
 
     Args:
-        path: of the file, which appears only when it is complete; layers are stored beside it until then.
+        path: path of the file, which appears only when it is complete; layers are stored beside it until then.
         render: renders a look, (height, width, 3 or 4); gets a callback for its progress.
-        look: of the image itself. layers: named looks, whose images become layers of the file.
-        attributes: of the file, from `build_attributes`.
-        precision: of the values.
+        look: look of the image itself. layers: named looks, whose images become layers of the file.
+        attributes: attributes of the file, from `build_attributes`.
+        precision: float type of the values.
         progress: called with the finished fraction, in [0, 1].
-        space: of the values, as in `attributes`.
+        space: color space of the values, as in `attributes`.
     Raises:
         RelumeError: the file cannot be written. Errors of `render` propagate; then there is no file.
     """

@@ -24,7 +24,7 @@ class Layer:
     """A layer of an image.
 
     Attributes:
-        name: in the file: letters, digits and underscores, at most 29.
+        name: name in the file: letters, digits and underscores, at most 29.
         source: light or light path, by its name in the look.
         look: look that renders the layer.
     """
@@ -38,7 +38,7 @@ def make_layers(layering: Layering, look: Look, *, has_indirect: bool) -> list[L
     """Make the requested layers; none with a shadow catcher, whose ratio is not additive.
 
     Args:
-        layering: selection. look: of the image. has_indirect: the bake has indirect light.
+        layering: selection. look: look of the image. has_indirect: the bake has indirect light.
     """
     if not layering or any(material.shadow_catcher for material in look.materials.values()):
         return []

@@ -29,7 +29,7 @@ class Provenance:
 
     Attributes:
         scene, bake: ids.
-        scene_name: for users.
+        scene_name: scene name for users.
     """
 
     scene: str
@@ -49,10 +49,10 @@ def build_attributes(
 
     Args:
         origin: scene and bake of the image.
-        camera: of the view.
+        camera: camera of the view.
         size: width and height, in pixels.
         look: the complete look.
-        layers: of the file, besides the image itself; their contents are listed by name.
+        layers: layers of the file, besides the image itself; their contents are listed by name.
         space: color space of the values.
     """
     environment = look.environment.map

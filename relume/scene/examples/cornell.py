@@ -89,8 +89,8 @@ def sunny_environment(
     """Return a blue environment with a sun disk, hazy by default; black below the horizon.
 
     Args:
-        sun_direction: toward the sun. rows: of the map, which is twice as wide.
-        radius: of the sun, radians; its radiance grows as the radius shrinks.
+        sun_direction: toward the sun. rows: number of rows of the map, which is twice as wide.
+        radius: radius of the sun, radians; its radiance grows as the radius shrinks.
     """
     directions = texel_directions(rows, 2 * rows).astype(np.float64)
     cosine = directions @ (sun_direction / np.linalg.norm(sun_direction))
@@ -136,7 +136,7 @@ def block(half_width: float, height: float, half_depth: float) -> GridSurface:
     """Return a block on y = 0 around the y axis, without its invisible bottom.
 
     Args:
-        half_width: along x, meters. height: along y, meters. half_depth: along z, meters.
+        half_width: half width along x, meters. height: height along y, meters. half_depth: half depth along z, meters.
     """
     x, z = half_width, half_depth
     corners = [(-x, z), (x, z), (x, -z), (-x, -z)]

@@ -14,7 +14,7 @@ from relume.scene.model import Material, Scene
 from relume.scene.scene_folder import make_scene
 
 _WIDTH, _HEIGHT, _DEPTH = 5.0, 2.7, 4.0
-_SILL, _LINTEL, _FROM, _TO = 0.8, 2.3, -1.2, 0.6  # of the window in the left wall
+_SILL, _LINTEL, _FROM, _TO = 0.8, 2.3, -1.2, 0.6  # edges of the window in the left wall
 _SUN_DIRECTION = np.array([-1.0, 0.75, 0.25])
 _PLASTER, _WOOD, _CLOTH = [0.78, 0.76, 0.72], [0.38, 0.24, 0.13], [0.16, 0.28, 0.45]
 

@@ -75,7 +75,7 @@ class AccessorReader:
         """Read vectors; normalized integers are scaled to [0, 1] or [-1, 1], others only converted.
 
         Args:
-            index: of the accessor in the document.
+            index: index of the accessor in the document.
             widths: allowed numbers of components.
             label: names the data in errors.
         Raises:
@@ -121,7 +121,7 @@ def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
 
     Args:
         container: the file's document and buffers.
-        index: of the view in the document.
+        index: index of the view in the document.
         label: names the data in errors.
     Raises:
         SceneError: there is no such view, it exceeds its buffer, or its compression is unsupported.

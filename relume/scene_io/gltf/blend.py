@@ -23,7 +23,7 @@ class MetallicBlend:
     """A material's textures and factors.
 
     Attributes:
-        raster: images "base", "packed", "specular", "tint". factor: of the base color.
+        raster: images "base", "packed", "specular", "tint". factor: factor of the base color.
         dielectric: f0 times the specular color. metallic, specular: factors.
     """
 

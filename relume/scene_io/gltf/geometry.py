@@ -28,7 +28,7 @@ class GltfGeometry:
     """A primitive before its node's transform; arrays as in `relume.scene.model.Mesh`.
 
     Attributes:
-        colors: of vertices, linear RGB and alpha in [0, 1], or None.
+        colors: colors of vertices, linear RGB and alpha in [0, 1], or None.
     """
 
     positions: Shaped[F32, "vertices 3"]
@@ -58,7 +58,7 @@ def read_primitive(
     """Read the primitive's triangles with the vertices they use; None if there are none, with a warning.
 
     Args:
-        reader: of the file's accessors.
+        reader: reader of the file's accessors.
         primitive: from the document.
         label: names the mesh in errors and warnings.
         warnings: gets one sentence for each omission.
@@ -163,7 +163,7 @@ def find_nondegenerate(
     """Return True for each triangle that has an area, relative to its longest edge.
 
     Args:
-        positions: of the vertices.
+        positions: positions of the vertices.
         faces: indices of the triangles' vertices.
         label: names the mesh in the warning.
         warnings: gets a sentence if some have no area.

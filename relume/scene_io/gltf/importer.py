@@ -56,7 +56,7 @@ def import_gltf(
 
     Args:
         data: the file's bytes.
-        name: of the scene, shown to users.
+        name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: files that it may refer to; None for none.
 

@@ -33,7 +33,8 @@ def read_instances(
     """Read the transforms of a node's instances, relative to the node.
 
     Args:
-        node: with or without the extension. accessors: of the file. max_instances: allowed number of instances.
+        node: node with or without the extension. accessors: accessors of the file.
+        max_instances: allowed number of instances.
         warnings: gets a sentence if the extension is invalid.
     Returns:
         One identity if there is no extension.

@@ -1,6 +1,6 @@
 """KHR_lights_punctual as the scene's local lights.
 
-The extension uses photometric units, candela and lux, and relume radiometric ones. Exporters that think in watts
+The extension uses photometric units, candela and lux, and relume radiometric ones. Exporters that work in watts
 multiply by 683 lm/W, the luminous efficacy of green light at 555 nm; this divides by it.
 """
 

@@ -27,7 +27,7 @@ def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[
     A node that is reached again, through another parent or as its own ancestor, is yielded only once.
 
     Args:
-        document: of the file. warnings: gets a sentence for each such node.
+        document: document of the file. warnings: gets a sentence for each such node.
 
     Raises:
         SceneError: a node does not exist, is nested too deeply, or is out of range.

@@ -38,7 +38,7 @@ def sheen_attenuation(max_sheen: float, roughness: float, *, by_light: bool) -> 
     """Attenuation of the layers below a sheen, as functions of θi and of θo.
 
     Args:
-        max_sheen: largest channel of the sheen's color. roughness: of the sheen.
+        max_sheen: largest channel of the sheen's color. roughness: roughness of the sheen.
         by_light: False if the layer has no curve of θi, so that the first function is one.
     """
     theta = _bin_centers()

@@ -39,7 +39,7 @@ class UvSlot:
     transform: UvTransform = field(default_factory=UvTransform)
 
     def apply(self, sets: Sequence[Shaped[F32, "vertices 2"]], num_vertices: int) -> Shaped[F32, "vertices 2"]:
-        """Scale, rotate (counter-clockwise with v down) and translate UV coordinates; zero if the set is missing."""
+        """Scale, rotate (counterclockwise with v down) and translate UV coordinates; zero if the set is missing."""
         if self.uv_set >= len(sets):
             return np.zeros((num_vertices, 2), np.float32)
         p = self.transform
@@ -60,7 +60,7 @@ class UvTransforms:
         """Choose the common UV coordinates.
 
         Args:
-            textures: of the material; the first decides if no common transform exists.
+            textures: textures of the material; the first decides if no common transform exists.
             label: names the material in warnings. warnings: gets a sentence if a texture has another transform.
         """
         self._label, self._warnings = label, warnings
@@ -79,7 +79,7 @@ class UvTransforms:
         """Tile an image to be sampled at the meshes' UV coordinates.
 
         Args:
-            info: one of the material's textures. pixels: top row first. wrap: of the texture.
+            info: one of the material's textures. pixels: top row first. wrap: wrap mode of the texture.
         """
         layout = tiling(self._slots[id(info)], self.slot)
         if layout == _NO_TILING or pixels.shape[:2] == (1, 1):
@@ -145,7 +145,7 @@ def compute_tangents(
     The bitangent cross(normal, tangent)·w points toward −v, which is up, as the green channel of normal maps expects.
 
     Args:
-        positions: of the vertices. normals: unit.
+        positions: positions of the vertices. normals: unit.
         uvs: UV coordinates, v from the top.
         faces: indices of the triangles' vertices.
     """

@@ -88,7 +88,7 @@ def variant_looks(
     """Return a partial look for each variant, with complete terms.
 
     Args:
-        names: of the variants, in file order.
+        names: names of the variants, in file order.
         scene_materials: the scene's materials, with their replacements.
         variant_materials: the replacement materials by their index in the file.
         warnings: gets one sentence for each feature that a look cannot replace.

@@ -33,7 +33,7 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
 
     Args:
         data: the file.
-        name: of the scene.
+        name: name of the scene.
         environment: None for the built-in studio.
         companions: further files.
     Raises:
@@ -81,7 +81,7 @@ def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene
 
     Args:
         data: the file.
-        name: of the scene.
+        name: name of the scene.
         environment: None for the built-in studio.
     Raises:
         SceneError: it is damaged, too large, or has no triangles.

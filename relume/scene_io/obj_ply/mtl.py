@@ -39,7 +39,7 @@ def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
     """Read the materials of a library by name.
 
     Args:
-        folder: of the library, relative to the scene.
+        folder: folder of the library, relative to the scene.
     Raises:
         SceneError: too large, too many materials, or a line is invalid.
     """
@@ -69,7 +69,7 @@ def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
 
 
 def _numbers(tokens: list[str], count: int, keyword: str) -> list[float]:
-    """Parse `count` numbers; one is repeated."""
+    """Parse `count` numbers; a single number is used for all channels."""
     try:
         values = [float(token) for token in tokens[:count]]
     except ValueError:
@@ -116,7 +116,7 @@ class MaterialMaker:
         return Material(material_name, terms, textures, normal_map, opacity=opacity)
 
     def _roughness(self, mtl_material: MtlMaterial, textures: dict[str, Texture], label: str) -> float | None:
-        """Pr times the mean of map_Pr, which becomes a texture if it varies; None if there are neither."""
+        """Roughness: Pr times the mean of map_Pr; None without both. A map that varies also becomes a texture."""
         factor = mtl_material.numbers.get("Pr", [None])[0]
         pixels = self._decode(mtl_material, "map_Pr", f"map_Pr of {label}")
         if pixels is None:
@@ -139,7 +139,7 @@ class MaterialMaker:
         return make_opacity(alpha, ("repeat", "repeat"), alpha_factor, None, label, self._warnings)
 
     def emission(self, material: Material, mtl_material: MtlMaterial | None) -> Shaped[F64, " 3"]:
-        """Radiance of a material's surfaces, multiplied by its emission texture: Ke."""
+        """Ke, the emitted radiance; the caller multiplies it by the emission texture."""
         if mtl_material is None:
             return np.zeros(3)
         factor = np.array(mtl_material.numbers.get("Ke", [0.0, 0.0, 0.0]))
@@ -227,5 +227,5 @@ def is_normal_map(pixels: Shaped[U8, "height width channels"]) -> bool:
 
 
 def _printable(name: str) -> str:
-    """The end of a file name, which says more than its start, in ASCII."""
+    """Return the last 60 characters of a file name, in ASCII; its end is more informative than its start."""
     return ("…" if len(name) > 60 else "") + name[-60:].encode("ascii", "replace").decode()

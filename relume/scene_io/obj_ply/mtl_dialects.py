@@ -86,8 +86,8 @@ def make_mtl_terms(
     """Convert a material to terms; also return the interpretation of Ks if users should know it.
 
     Args:
-        mtl_material: its numbers. textures: by channel.
-        roughness: of the PBR extension, including its map; None without it.
+        mtl_material: its numbers. textures: textures by channel.
+        roughness: roughness of the PBR extension, including its map; None without it.
         has_normal_map: minification widens its highlights.
     """
     numbers = mtl_material.numbers

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: the lines that describe triangles, in file order.
+"""Reader of Wavefront OBJ: keeps the lines that describe triangles, in file order.
 
 Object Files, appendix B1 of Wavefront's Advanced Visualizer manual. Polygons become fans; curves, surfaces, points and
 lines are ignored. Negative indices count back from the current line.
@@ -32,7 +32,7 @@ class Obj:
     """The triangles of an OBJ file and its references.
 
     Attributes:
-        colors: of positions, as scanners and sculpting programs write them after the coordinates; unused if incomplete.
+        colors: vertex colors after the coordinates of `v` lines; ignored unless every vertex has one.
         libraries: names of material files.
         groups: triangles, nine indices each, by object and material.
         ignored_keywords: kinds of unsupported lines.

@@ -42,7 +42,7 @@ def make_mesh(
 
     Args:
         corners: the triangles of the file.
-        name: of the mesh.
+        name: name of the mesh.
         number: index of its material in the scene.
         material: the material; a normal map needs tangents.
         label: names the mesh in errors and warnings.
@@ -103,7 +103,7 @@ def creased_normals(
     """Compute area-weighted mean normals at a vertex over the triangles within 60° of the corner's own normal.
 
     Args:
-        points: of the corners. vertex_indices: corners with equal indices share a vertex.
+        points: points of the corners. vertex_indices: corners with equal indices share a vertex.
     Returns:
         Unit normals of all corners.
     """

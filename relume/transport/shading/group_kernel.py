@@ -1,4 +1,4 @@
-"""Kernels of light groups: which groups a point sees entirely, and which are accurate enough as one light."""
+"""Kernels of light clusters: find those that a point sees entirely, and those that are accurate enough as one light."""
 
 from __future__ import annotations
 
@@ -6,14 +6,7 @@ import numba as nb
 import numpy as np
 
 from relume.core.numba_options import NO_REFCOUNT
-from relume.transport.shading.light_list_kernel import (
-    allocate_chunks,
-    band_scales,
-    defer_triangles,
-    error_tolerance,
-    evaluate_listed,
-    per_axis,
-)
+from relume.transport.shading.light_list_kernel import defer_triangles, error_tolerance, evaluate_listed
 from relume.transport.shading.table_averages import CHUNK, sum_up
 
 
@@ -23,7 +16,7 @@ def select_groups(visibility_words, first, group_lights, whole):  # type: ignore
 
     Args:
         visibility_words: of each light, bit k for point k; cleared for lights of entirely visible groups. (M,) uint64
-        first, group_lights: of `relume.lights.spherical_triangles.LightGroups`. whole: visibility of each group,
+        first, group_lights: see `relume.lights.spherical_triangles.LightClusters`. whole: visibility of each group,
             written. (G,) uint64
     """
     for g in range(whole.shape[0]):
@@ -44,69 +37,30 @@ def _restore_lights(bits, first, group_lights, group):  # type: ignore[no-untype
         bits[group_lights[k] >> 3] |= np.uint8(1) << np.uint8(group_lights[k] & 7)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def add_groups(  # type: ignore[no-untyped-def]
-    normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, visible, out
-):
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def add_groups(points, listed, shading, table, groups, curves, start, stop, scratch, visible, out):  # type: ignore[no-untyped-def]
     """Add groups that are accurate enough as one light; restore the lights of the others.
 
     Args:
-        normal, tangent, axes, curves, start, stop, out: as in `shade_points`.
-        light_list: first, light and shading of the listed groups. local_wo: of the same list.
-        lights: nodes, irradiance_radius and `between_variance` of the groups. groups: first and light_index, see
-            `LightGroups`.
+        points, listed, shading, table, curves, start, stop, out: as in `shade_points`, for groups instead of lights.
+        groups: first and light_index, see `LightGroups`. scratch: `ListScratch`.
         visible: of the points; lights to shade individually are set. (points, bytes)
     """
-    num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
-    chunks = allocate_chunks(lights[0].shape[0] // CHUNK + 1, num_rows)
-    local, scratch = np.empty((3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
-    wo, total, chunk_range = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(CHUNK, np.float32)
-    scratch_arrays = (chunks, local, scratch, wo, total, chunk_range)
-    _add(
-        normal,
-        tangent,
-        light_list,
-        local_wo,
-        lights,
-        groups,
-        axes,
-        (curves, scale),
-        start,
-        stop,
-        scratch_arrays,
-        visible,
-        out,
-    )
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _add(  # type: ignore[no-untyped-def]
-    normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, scratch_arrays, visible, out
-):
-    """Implement `add_groups` in the memory that it allocates."""
-    (first, light, shading), (curves, scale) = light_list, curves
-    chunks, local, scratch, wo, total, chunk_range = scratch_arrays
-    weight, _, deferred, value, error = chunks
+    (weight, _, deferred, value, error), total = scratch.chunks, scratch.total
     for p in range(start, stop):
         row = p - start
-        begin, end = first[row], first[row + 1]
+        begin, end = listed.first[row], listed.first[row + 1]
         if begin == end:
             continue
-        per_axis(axes, local_wo, begin, wo)
-        total[:] = 0
-        evaluate_listed(
-            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local, scratch, chunk_range,
-            chunks, total,
-        )  # fmt: skip
+        evaluate_listed(points.normal[p], points.tangent[p], listed, shading, begin, end, table, curves, scratch)
         tolerance = error_tolerance(total, out[row, :, 0])
         total[:] = 0
         for chunk in range((end - begin + CHUNK - 1) // CHUNK):
             at = begin + chunk * CHUNK
             num = min(CHUNK, end - at)
-            for n in deferred[
-                chunk, : defer_triangles(value[chunk], weight[chunk], error[chunk], num, tolerance, deferred[chunk])
-            ]:
-                _restore_lights(visible[row], groups[0], groups[1], light[at + n])
+            count = defer_triangles(value[chunk], weight[chunk], error[chunk], num, tolerance, deferred[chunk])
+            for n in deferred[chunk, :count]:
+                _restore_lights(visible[row], groups[0], groups[1], listed.light[at + n])
             sum_up(value[chunk], weight[chunk], num, total)
         for channel in range(3):
             out[row, channel, 0] += total[channel]

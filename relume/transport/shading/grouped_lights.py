@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.core.bit_matrix import rows_to_words, words_to_rows
-from relume.lights.spherical_triangles import LightGroups
+from relume.lights.spherical_triangles import LightClusters
 from relume.transport.light_lists import LightList
 from relume.transport.shading.group_kernel import add_groups, select_groups
+from relume.transport.shading.light_list_kernel import TriangleTable, allocate_scratch
 from relume.transport.shading_points import ShadingPoints
-from relume.transport.term_contraction import Contraction
+from relume.transport.term_contraction import Contraction, WholeCurves
 
 F32 = NDArray[np.float32]
 Bits = NDArray[np.uint8]
@@ -26,15 +27,22 @@ class GroupedLights:
     """Shades groups of lights at blocks of receivers; holds the scratch memory of one thread.
 
     Args:
-        term, contraction, receivers: as in `relume.transport.shading.shader.Shader`.
+        term, contraction, receivers: as in `relume.transport.shading.shader.Shader`. curves: of the contraction.
         groups: of the lights. num_lights: number of individual lights.
     """
 
     def __init__(
-        self, term: Term, contraction: Contraction, groups: LightGroups, num_lights: int, receivers: ShadingPoints
+        self,
+        term: Term,
+        contraction: Contraction,
+        curves: WholeCurves,
+        groups: LightClusters,
+        num_lights: int,
+        receivers: ShadingPoints,
     ) -> None:
-        self._receivers, self._contraction, self._groups = receivers, contraction, groups
+        self._receivers, self._curves, self._groups = receivers, curves, groups
         self._light_list = LightList(term, contraction, groups.lights, receivers)
+        self._scratch = allocate_scratch(curves, groups.lights.num_lights, has_groups=True)
         self._visibility_words, self._whole = (
             np.empty(num_lights, np.uint64),
             np.empty(groups.lights.num_lights, np.uint64),
@@ -48,18 +56,15 @@ class GroupedLights:
         Returns:
             Visibility of the lights that remain to be shaded, as in `ShadingPoints`.
         """
-        r, c, groups, light_list = self._receivers, self._contraction, self._groups, self._light_list
+        r, groups, light_list = self._receivers, self._groups, self._light_list
         remaining = np.empty_like(r.visible[start:stop])
         whole = np.empty((stop - start, (len(self._whole) + 7) // 8), np.uint8)
         rows_to_words(r.visible[start:stop], self._visibility_words)
         select_groups(self._visibility_words, groups.first, groups.light_index, self._whole)
         words_to_rows(self._visibility_words, remaining)
         words_to_rows(self._whole, whole)
-        shading, wo = light_list.list(start, stop, whole)
-        lights = groups.lights.nodes_by_light, light_list.irradiance_radius, groups.between_variance
-        add_groups(
-            r.normal, r.tangent, (light_list.first, light_list.light, shading), wo, lights, (groups.first,
-            groups.light_index),
-            c.axes, c.whole, start, stop, remaining, out,
-        )  # fmt: skip
+        shading = light_list.list(start, whole)
+        table = TriangleTable(groups.lights.nodes_by_light, light_list.irradiance_radius, groups.between_variance)
+        group_args = table, (groups.first, groups.light_index), self._curves, start, stop, self._scratch
+        add_groups(r.points, light_list.listed, shading, *group_args, remaining, out)
         return remaining

@@ -2,75 +2,110 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
+from relume.transport.light_culling import scale_by_axes
 from relume.transport.shading.table_averages import CHUNK, evaluate, load_midpoints, load_weights, rotate_nodes, sum_up
+from relume.transport.term_contraction import WholeCurves
+
+F32 = NDArray[np.float32]
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 # A triangle is too inaccurate if its error exceeds both: a fraction of its own contribution, and of all light.
 _TOLERANCE, _TOLERANCE_OF_ALL = np.float32(0.02), np.float32(1e-3)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def band_scales(curves):  # type: ignore[no-untyped-def]
-    """Return the bands per radian of each curve, and the number of rows of their product. curves: see `evaluate`."""
-    _, _, num_rows, num_bands = curves
-    scale, max_rows = np.empty(num_bands.shape[0], np.float32), 1
-    for k in range(num_bands.shape[0]):
-        scale[k], max_rows = num_bands[k] / (np.pi / 2), max(max_rows, num_rows[k])
-    return scale, max_rows
+class TriangleTable(NamedTuple):
+    """Light triangles, one row each.
+
+    Attributes:
+        nodes: corners and edge midpoints. irradiance_radius: irradiance and, in radians, radius.
+        between_variance: of groups, see `LightGroups`; empty for individual lights.
+    """
+
+    nodes: Shaped[F32, "M 6 3"]
+    irradiance_radius: Shaped[F32, "M 4"]
+    between_variance: Shaped[F32, " M_or_none"]
+
+
+class Chunks(NamedTuple):
+    """Memory for chunks of triangles.
+
+    Attributes:
+        weight: irradiance · q cos θi. radius: radians. deferred: indices of inaccurate ones. value, error: from
+            `evaluate`.
+    """
+
+    weight: Shaped[F32, "chunks 3 CHUNK"]
+    radius: Shaped[F32, "chunks CHUNK"]
+    deferred: Shaped[NDArray[np.int64], "chunks CHUNK_and_one"]
+    value: Shaped[F32, "chunks rows CHUNK"]
+    error: Shaped[F32, "chunks CHUNK"]
+
+
+class ListScratch(NamedTuple):
+    """Scratch memory of a point's listed lights.
+
+    Attributes:
+        wo: local, times `Curve.axes`. total: sum of light. chunks: all lights of a point. local: nodes of one chunk.
+        averages: for `evaluate`. between_variance: of one chunk.
+    """
+
+    wo: Shaped[F32, "C 3"]
+    total: Shaped[F32, " 3"]
+    chunks: Chunks
+    local: Shaped[F32, "3 6 CHUNK"]
+    averages: Shaped[F32, "11 CHUNK"]
+    between_variance: Shaped[F32, " CHUNK_or_none"]
+
+
+def allocate_chunks(num: int, num_rows: int) -> Chunks:
+    """Allocate `num` chunks. num_rows: of the product of the curves, 1 or 3."""
+    weight, value = np.empty((num, 3, CHUNK), np.float32), np.empty((num, num_rows, CHUNK), np.float32)
+    radius, error = np.empty((2, num, CHUNK), np.float32)
+    return Chunks(weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error)
+
+
+def allocate_scratch(curves: WholeCurves, max_lights: int, *, has_groups: bool = False) -> ListScratch:
+    """Allocate scratch memory for points with at most `max_lights` lights or, if `has_groups`, groups."""
+    chunks = allocate_chunks(max_lights // CHUNK + 1, int(curves.num_rows.max(initial=1)))
+    local, averages = np.empty((3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
+    wo, between_variance = np.empty_like(curves.axes), np.empty(CHUNK if has_groups else 0, np.float32)
+    return ListScratch(wo, np.empty(3, np.float32), chunks, local, averages, between_variance)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def per_axis(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
-    """Multiply wo by the axes of each curve.
+def evaluate_listed(n, t, listed, shading, begin, end, table, curves, scratch):  # type: ignore[no-untyped-def]
+    """Evaluate a point's listed lights [begin, end), chunk by chunk; sum them in `scratch.total`.
 
     Args:
-        axes: of the curves. (C, 3). local_wo: of all entries. (3, entries). entry: its index. out: written. (C, 3)
+        n, t: normal and tangent of the point. listed, shading, table, curves: as in `shade_points`.
+        scratch: `ListScratch`, written except for the deferred indices.
     """
-    for k in range(axes.shape[0]):
-        for axis in range(3):
-            out[k, axis] = axes[k, axis] * local_wo[axis, entry]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def allocate_chunks(num, num_rows):  # type: ignore[no-untyped-def]
-    """Allocate `num` chunks of triangles: weight, radius, deferred indices, value, error."""
-    weight, radius = np.empty((num, 3, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
-    value, error = np.empty((num, num_rows, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
-    return weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def evaluate_listed(  # type: ignore[no-untyped-def]
-    n, t, light_list, begin, end, lights, curves, scale, wo, local, scratch, chunk_range, chunks, total
-):
-    """Evaluate a point's listed lights [begin, end), chunk by chunk.
-
-    Args:
-        n, t: normal and tangent of the point. light_list: light and shading of its list.
-        lights: nodes and irradiance_radius, see `shade_points`, and group_range, see `evaluate`, of all lights.
-        curves, scale, wo, scratch: as in `evaluate`. local: of one chunk, written.
-        chunk_range: scratch for the group_range of a chunk; unused if that is empty. (CHUNK,)
-        chunks: from `allocate_chunks`, written except for the deferred indices. total: added to. (3,)
-    """
-    light, shading = light_list
-    nodes, irradiance_radius, group_range = lights
-    weight, reach, _, value, error = chunks
+    weight, radius, _, value, error = scratch.chunks
+    scale_by_axes(curves.axes, listed.wo, begin, scratch.wo)
+    scratch.total[:] = 0
     for chunk in range((end - begin + CHUNK - 1) // CHUNK):
         at = begin + chunk * CHUNK
         num = min(CHUNK, end - at)
-        if scale.shape[0] > 0:
-            load_midpoints(nodes, light, at, num, local)
-            rotate_nodes(n, t, 3, num, local)
-        load_weights(irradiance_radius, light, shading, at, num, weight[chunk], reach[chunk])
-        if group_range.shape[0] > 0:
-            for k in range(num):
-                chunk_range[k] = group_range[light[at + k]]
-        evaluate(curves, scale, wo, local, reach[chunk], chunk_range, num, scratch, value[chunk], error[chunk])
-        sum_up(value[chunk], weight[chunk], num, total)
+        light = listed.light[at : at + num]
+        if curves.kinds.shape[0] > 0:
+            load_midpoints(table.nodes, light, scratch.local)
+            rotate_nodes(n, t, 3, num, scratch.local)
+        load_weights(table.irradiance_radius, light, shading[:, at : at + num], weight[chunk], radius[chunk])
+        for k in range(min(num, scratch.between_variance.shape[0])):
+            scratch.between_variance[k] = table.between_variance[light[k]]
+        evaluate(
+            curves, scratch.wo, scratch.local, radius[chunk], scratch.between_variance, num, scratch.averages,
+            value[chunk], error[chunk],
+        )  # fmt: skip
+        sum_up(value[chunk], weight[chunk], num, scratch.total)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)

@@ -7,25 +7,54 @@ Triangles for which this is too inaccurate are divided, if they matter at the po
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.transport.shading.light_list_kernel import (
+    Chunks,
     allocate_chunks,
-    band_scales,
     defer_triangles,
     error_tolerance,
     evaluate_listed,
-    per_axis,
 )
 from relume.transport.shading.table_averages import CHUNK, evaluate, load_nodes, rotate_nodes, sum_up
+
+F32 = NDArray[np.float32]
+I64 = NDArray[np.int64]
 
 _ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _MAX_DEPTH = 6
+
+
+class DivisionScratch(NamedTuple):
+    """Scratch memory for dividing triangles: one chunk per generation.
+
+    Attributes:
+        local: nodes in the frame of the point. generations: as of listed lights. lights: divided ones of a chunk.
+        num, done: triangles to divide per generation, and how many of them are done. parent: for `_divide`.
+    """
+
+    local: Shaped[F32, "generations 3 6 CHUNK"]
+    generations: Chunks
+    lights: Shaped[NDArray[np.int32], " CHUNK"]
+    num: Shaped[I64, " generations"]
+    done: Shaped[I64, " generations"]
+    parent: Shaped[F32, "22 CHUNK/4"]
+
+
+def allocate_division(num_rows: int) -> DivisionScratch:
+    """Allocate scratch memory. num_rows: of the product of the curves, 1 or 3."""
+    local, lights = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty(CHUNK, np.int32)
+    count, done = np.empty((2, _MAX_DEPTH + 1), np.int64)
+    parent = np.empty((22, CHUNK // 4), np.float32)
+    return DivisionScratch(local, allocate_chunks(_MAX_DEPTH + 1, num_rows), lights, count, done, parent)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -45,8 +74,9 @@ def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radi
     """Create the four children of the listed triangles; return their number.
 
     Args:
-        local, weight, radius: of a generation, as in `evaluate` and `load_weights`. indices: the listed. (n,)
-        parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: of the children, written.
+        local, weight, radius: arrays of a generation, as in `evaluate` and `load_weights`.
+        indices: the listed. (n,)
+        parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: arrays of the children, written.
     """
     count = indices.shape[0]
     for node in range(6):
@@ -82,20 +112,14 @@ def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radi
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations, division_scratch, scratch, total):  # type: ignore[no-untyped-def]
-    """Add divided triangles: the first `num` of the first generation, and recursively their children.
+def _add_divided(curves, num, tolerance, scratch, division):  # type: ignore[no-untyped-def]
+    """Add divided triangles to the total: the first `num` of the first generation, and recursively their children.
 
     Args:
-        curves, scale, wo, scratch: as in `evaluate`. no_group_range: its group_range, empty.
-        tolerance: as in `defer_triangles`.
-        generations: local, weight, radius, indices, value and error of each, written except for the first three of the
-            first.
-        division_scratch: scratch for parents, and for the number of triangles and of finished ones per generation, see
-            `shade_points`.
-        total: added to. (3,)
+        curves, scratch: as in `shade_points`. tolerance: as in `defer_triangles`.
+        division: `DivisionScratch`, written except for the nodes, weights and radii of the first generation.
     """
-    local, weight, radius, deferred, value, error = generations
-    parent, count, done = division_scratch
+    local, (weight, radius, deferred, value, error), _, count, done, parent = division
     for n in range(num):
         deferred[0, n] = n
     level, count[0], done[0] = 0, num, 0
@@ -105,94 +129,40 @@ def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations,
             continue
         batch = deferred[level, done[level] : min(done[level] + CHUNK // 4, count[level])]
         done[level] += len(batch)
-        child_level = level + 1
+        up, level = level, level + 1
         num_children = _divide(
-            local[level],
-            weight[level],
-            radius[level],
-            batch,
-            parent,
-            local[child_level],
-            weight[child_level],
-            radius[child_level],
+            local[up], weight[up], radius[up], batch, parent, local[level], weight[level], radius[level]
         )
         evaluate(
-            curves,
-            scale,
-            wo,
-            local[child_level],
-            radius[child_level],
-            no_group_range,
-            num_children,
-            scratch,
-            value[child_level],
-            error[child_level],
-        )
-        done[child_level] = count[child_level] = 0
-        if child_level < _MAX_DEPTH:
-            count[child_level] = defer_triangles(
-                value[child_level],
-                weight[child_level],
-                error[child_level],
-                num_children,
-                tolerance,
-                deferred[child_level],
+            curves, scratch.wo, local[level], radius[level], scratch.between_variance, num_children, scratch.averages,
+            value[level], error[level],
+        )  # fmt: skip
+        done[level] = count[level] = 0
+        if level < _MAX_DEPTH:
+            count[level] = defer_triangles(
+                value[level], weight[level], error[level], num_children, tolerance, deferred[level]
             )
-        sum_up(value[child_level], weight[child_level], num_children, total)
-        level = child_level
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def shade_points(  # type: ignore[no-untyped-def]
-    normal, tangent, first, light, shading, local_wo, nodes, irradiance_radius, axes, curves, start, stop, out
-):
-    """Add the contributions of the listed lights to points [start, stop).
-
-    Args:
-        normal, tangent, first, light, shading, local_wo, start, stop: as in `project_points`.
-        nodes: of the lights. (M, 6, 3) float32 irradiance_radius: their irradiance and, in radians, radius. (M, 4)
-            float32
-        axes: `Curve.axes` of each. (C, 3) float32
-        curves: see `evaluate`.
-        out: added to; its content counts as part of a point's light. (points, 3, ≥ 1) float32
-    """
-    num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
-    # allocated here: a constant is not writable and would compile its users once more
-    wo, total, no_group_range = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(0, np.float32)
-    chunks, child_arrays = (
-        allocate_chunks(nodes.shape[0] // CHUNK + 1, num_rows),
-        allocate_chunks(_MAX_DEPTH + 1, num_rows),
-    )
-    local, scratch = np.empty((_MAX_DEPTH + 1, 3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
-    count, done = np.empty(_MAX_DEPTH + 1, np.int64), np.empty(_MAX_DEPTH + 1, np.int64)
-    division_scratch = (np.empty((22, CHUNK // 4), np.float32), count, done)
-    _shade(
-        normal, tangent, (first, light, shading), local_wo, (nodes, irradiance_radius, no_group_range), axes, (curves,
-        scale), start, stop,
-        (wo, total, np.empty(CHUNK, np.int32), chunks, (local, *child_arrays), division_scratch, scratch), out,
-    )  # fmt: skip
+        sum_up(value[level], weight[level], num_children, scratch.total)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _shade(normal, tangent, entries, local_wo, lights, axes, curves, start, stop, scratch_arrays, out):  # type: ignore[no-untyped-def]
-    """Implement `shade_points` in the memory that it allocates."""
-    (first, light, shading), (nodes, _, no_group_range), (curves, scale) = entries, lights, curves
-    wo, total, deferred_lights, chunks, generations, division_scratch, scratch = scratch_arrays
-    weight, reach, deferred, value, error = chunks
-    local, child_arrays = generations[0], generations[1:]
+def shade_points(points, listed, shading, table, curves, start, stop, scratch, division, out):  # type: ignore[no-untyped-def]
+    """Add the contributions of the listed lights to points [start, stop).
+
+    Args:
+        points, listed, shading, start, stop: as in `project_points`. table: `TriangleTable` of the lights.
+        curves: `WholeCurves`. scratch, division: `ListScratch`, `DivisionScratch`.
+        out: added to; its content counts as part of a point's light. (points, 3, ≥ 1) float32
+    """
+    weight, radius, deferred, value, error = scratch.chunks
+    local, total, lights = division.local[0], scratch.total, division.lights
     for p in range(start, stop):
-        begin, end = first[p - start], first[p - start + 1]
+        begin, end = listed.first[p - start], listed.first[p - start + 1]
         if begin == end:
             continue
-        per_axis(axes, local_wo, begin, wo)
-        total[:] = 0
-        evaluate_listed(
-            normal[p], tangent[p], (light, shading), begin, end, lights, curves, scale, wo, local[0], scratch,
-            no_group_range,
-            chunks, total,
-        )  # fmt: skip
-        row = out[p - start, :, 0]
-        if axes.shape[0] == 0:
+        n, t, row = points.normal[p], points.tangent[p], out[p - start, :, 0]
+        evaluate_listed(n, t, listed, shading, begin, end, table, curves, scratch)
+        if curves.kinds.shape[0] == 0:
             _add_to(row, total)
             continue
         tolerance = error_tolerance(total, row)  # including the light already in the row
@@ -205,16 +175,12 @@ def _shade(normal, tangent, entries, local_wo, lights, axes, curves, start, stop
             if divided == 0:
                 continue
             entries = deferred[chunk, :divided]
-            _copy(light[at : at + num], entries, deferred_lights)
-            _copy(reach[chunk], entries, child_arrays[1][0])
+            _copy(listed.light[at : at + num], entries, lights)
+            _copy(radius[chunk], entries, division.generations.radius[0])
             for channel in range(3):
-                _copy(weight[chunk, channel], entries, child_arrays[0][0, channel])
+                _copy(weight[chunk, channel], entries, division.generations.weight[0, channel])
             for node in range(6):
-                load_nodes(
-                    nodes, node, deferred_lights, 0, divided, local[0, 0, node], local[0, 1, node], local[0, 2, node]
-                )
-            rotate_nodes(normal[p], tangent[p], 0, divided, local[0])
-            _add_divided(
-                curves, scale, wo, no_group_range, divided, tolerance, generations, division_scratch, scratch, total
-            )
+                load_nodes(table.nodes, node, lights[:divided], local[0, node], local[1, node], local[2, node])
+            rotate_nodes(n, t, 0, divided, local)
+            _add_divided(curves, divided, tolerance, scratch, division)
         _add_to(row, total)

@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.lights.spherical_triangles import TriangleLights
 from relume.transport.diffuse_projector import DiffuseProjector
+from relume.transport.light_culling import ListedLights
 from relume.transport.light_lists import POINTS_PER_BLOCK, AreaLightList, LightList, area_light_lists
 from relume.transport.ray_projector import RayProjector
 from relume.transport.shading.grouped_lights import GroupedLights
-from relume.transport.shading.shade_kernel import shade_points
+from relume.transport.shading.light_list_kernel import TriangleTable, allocate_scratch
+from relume.transport.shading.shade_kernel import allocate_division, shade_points
 from relume.transport.shading_points import ShadingPoints
 from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
+_NO_GROUPS = np.empty(0, np.float32)
 
 
 class Shader:
@@ -42,20 +45,19 @@ class Shader:
         receivers: ShadingPoints,
         base_radiance: Shaped[F32, "n 3"] | None = None,
     ) -> None:
-        self._contraction, self._lights, self._receivers, self._base_radiance = (
-            contraction,
-            lights,
-            receivers,
-            base_radiance,
-        )
+        self._lights, self._receivers, self._base_radiance = lights, receivers, base_radiance
+        curves = self._curves = contraction.whole()
         self._light_list = LightList(term, contraction, lights, receivers)
         is_diffuse = term.is_lambertian and contraction.kinds.size == 0
         self._diffuse = DiffuseProjector(term, contraction.constant, lights) if is_diffuse else None
         is_groupable = contraction.kinds.size > 0 and not term.is_steep  # curves bound the variation within a group
-        groups = lights.groups if is_groupable else None
-        self._grouped = groups and GroupedLights(term, contraction, groups, lights.num_lights, receivers)
+        groups = lights.clusters if is_groupable else None
+        self._grouped = groups and GroupedLights(term, contraction, curves, groups, lights.num_lights, receivers)
         self._rays = RayProjector(term, contraction, receivers, POINTS_PER_BLOCK)
         self._area_lights = area_light_lists(term, contraction, receivers)
+        max_lights = max([lights.num_lights, *(area_light.max_triangles_per_point for area_light in self._area_lights)])
+        self._scratch = allocate_scratch(curves, max_lights)
+        self._division = allocate_division(self._scratch.chunks.value.shape[1])
 
     def project(self, start: int, stop: int) -> Shaped[F32, "m 1 3"]:
         """Return the reflected radiance of points [start, stop), with the layout of `Projector.project`."""
@@ -73,25 +75,22 @@ class Shader:
         return (out - base_radiance[..., None]).transpose(0, 2, 1)
 
     def _add_area_light(self, area_light: AreaLightList, start: int, stop: int, out: F32) -> None:
-        r, c = self._receivers, self._contraction
+        table = TriangleTable(*area_light.triangles, _NO_GROUPS)
         for block in range(start, stop, area_light.points_per_block):
             end = min(block + area_light.points_per_block, stop)
-            shading, wo, nodes, irradiance_radius = area_light.list(block, end)
-            shade_points(
-                r.normal, r.tangent, area_light.first, area_light.light, shading, wo, nodes, irradiance_radius,
-                c.axes, c.whole, block, end, out[block - start : end - start],
-            )  # fmt: skip
+            shading, _ = area_light.list(block, end)
+            self._shade(area_light.listed, shading, table, block, end, out[block - start : end - start])
 
     def _add_listed(self, start: int, stop: int, out: F32) -> None:
         """Add the environment by lists of lights."""
-        r, c, light_list = self._receivers, self._contraction, self._light_list
+        light_list, all_visible = self._light_list, self._receivers.visible
+        table = TriangleTable(self._lights.nodes_by_light, light_list.irradiance_radius, _NO_GROUPS)
         for block in range(start, stop, POINTS_PER_BLOCK):
             end = min(block + POINTS_PER_BLOCK, stop)
             block_out = out[block - start : end - start]
-            visible = self._grouped.add(block, end, block_out) if self._grouped else r.visible[block:end]
-            shading, wo = light_list.list(block, end, visible)
-            shade_points(
-                r.normal, r.tangent, light_list.first, light_list.light, shading, wo, self._lights.nodes_by_light,
-                light_list.irradiance_radius,
-                c.axes, c.whole, block, end, block_out,
-            )  # fmt: skip
+            visible = self._grouped.add(block, end, block_out) if self._grouped else all_visible[block:end]
+            self._shade(light_list.listed, light_list.list(block, visible), table, block, end, block_out)
+
+    def _shade(self, listed: ListedLights, shading: F32, table: TriangleTable, start: int, stop: int, out: F32) -> None:
+        block_args = self._curves, start, stop, self._scratch, self._division, out
+        shade_points(self._receivers.points, listed, shading, table, *block_args)

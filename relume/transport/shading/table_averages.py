@@ -77,11 +77,12 @@ def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  # type: ignore[no-untyped-def]
+def _compute_cosine_shift(gamma, mean, local, between_variance, num, cosine_shift):  # type: ignore[no-untyped-def]
     """Compute how an angle varies with cos θi between the lights of groups: covariance over mean cosine.
 
     Args:
-        gamma, mean: as in `_spread`. local, group_range: as in `evaluate`. cosine_shift: in bands, written. (≥ num,)
+        gamma, mean: as in `_spread`. local, between_variance: as in `evaluate`.
+        cosine_shift: in bands, written. (≥ num,)
     """
     a, b, c = gamma[0], gamma[1], gamma[2]
     z_a, z_b, z_c = local[2, 3], local[2, 4], local[2, 5]
@@ -91,7 +92,10 @@ def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  
         covariance = (a[n] - mean[n]) * by_a + (b[n] - mean[n]) * by_b + (c[n] - mean[n]) * by_c
         # a triangle across the horizon has no more slope than one that reaches it
         cosine_shift[n] = (
-            group_range[n] * covariance * _THIRD / max(cosine, abs(by_a) + abs(by_b) + abs(by_c) + np.float32(1e-6))
+            between_variance[n]
+            * covariance
+            * _THIRD
+            / max(cosine, abs(by_a) + abs(by_b) + abs(by_c) + np.float32(1e-6))
         )
 
 
@@ -100,7 +104,7 @@ def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[n
     """Integrate a curve times cos θi over boxes, relative to the mean cosine.
 
     Args:
-        steps: of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. cosine_shift: from
+        steps: steps of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. cosine_shift: from
             `_compute_cosine_shift`.
         integral: written. (≥ num,)
     """
@@ -155,19 +159,18 @@ def _multiply(factor, num, value):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value, error):  # type: ignore[no-untyped-def]
+def evaluate(curves, wo, local, radius, between_variance, num, scratch, value, error):  # type: ignore[no-untyped-def]
     """Multiply the averages of all curves over triangles.
 
     Args:
-        curves: kinds, steps, numbers of rows and of bands, see `WholeCurves`. scale: bands per radian. (C,)
-        wo: times `Curve.axes`, one for each curve. (C, 3)
+        curves: `WholeCurves`. wo: times `Curve.axes`, one for each curve. (C, 3)
         local: corners and edge midpoints; only the midpoints are read. (3 axes, 6, ≥ num)
         radius: of the triangles, radians. (≥ num,)
-        group_range: of groups, variance between their lights, each with one cos θi; empty for individual lights.
+        between_variance: of groups, variance between their lights, each with one cos θi; empty for individual lights.
             (≥ num,)
         scratch: (11, ≥ num). value: written. (1 or 3, ≥ num) error: relative, written. (≥ num,)
     """
-    kinds, steps, num_rows, _ = curves
+    kinds, _, scale, steps, num_rows = curves
     gamma, mean, half, reach, low = scratch[:3], scratch[3], scratch[4], scratch[5], scratch[6]
     high, curve_mean, variation, cosine_shift = scratch[7], scratch[8], scratch[9], scratch[10]
     value[:, :num] = 1
@@ -183,8 +186,8 @@ def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value,
         _spread(gamma, num, mean, half)
         _compute_reach(kinds[k], scale[k], wo[k], local, radius, half, num, reach)
         _ends(mean, half, last, num, low, high)
-        if group_range.shape[0]:
-            _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift)
+        if between_variance.shape[0]:
+            _compute_cosine_shift(gamma, mean, local, between_variance, num, cosine_shift)
         for row in range(value.shape[0]):
             if row < num_rows[k]:
                 _integrals(steps[k, row], low, high, cosine_shift, num, curve_mean)
@@ -195,30 +198,25 @@ def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value,
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped-def]
-    """Look up a node of listed lights [begin, begin + num).
+def load_nodes(nodes, node, light, x, y, z):  # type: ignore[no-untyped-def]
+    """Look up a node of listed lights.
 
     Args:
-        nodes: of all lights. (M, 6, 3) node: its index. light: listed lights. (K,) begin, num: range of the list.
-        x, y, z: written. (≥ num,) each
+        nodes: of all lights. (M, 6, 3) node: its index. light: listed lights. (num,) x, y, z: written. (≥ num,) each
     """
-    for k in range(num):
-        m = np.uint32(light[begin + k])
+    for k in range(light.shape[0]):
+        m = np.uint32(light[k])
         x[k], y[k], z[k] = nodes[m, node, 0], nodes[m, node, 1], nodes[m, node, 2]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
-    """Look up the edge midpoints of listed lights [begin, begin + num).
-
-    Args:
-        nodes, light, begin, num: as in `load_nodes`. local: written. (3, 6, ≥ num)
-    """
+def load_midpoints(nodes, light, local):  # type: ignore[no-untyped-def]
+    """Look up the edge midpoints of listed lights. nodes, light: as in `load_nodes`. local: written. (3, 6, ≥ num)"""
     ab_x, bc_x, ca_x = local[0, 3], local[0, 4], local[0, 5]
     ab_y, bc_y, ca_y = local[1, 3], local[1, 4], local[1, 5]
     ab_z, bc_z, ca_z = local[2, 3], local[2, 4], local[2, 5]
-    for k in range(num):  # not vectorizable in any order: load all of a light, which is contiguous
-        m = np.uint32(light[begin + k])
+    for k in range(light.shape[0]):  # not vectorizable in any order: load all of a light, which is contiguous
+        m = np.uint32(light[k])
         ab_x[k], ab_y[k], ab_z[k] = nodes[m, 3, 0], nodes[m, 3, 1], nodes[m, 3, 2]
         bc_x[k], bc_y[k], bc_z[k] = nodes[m, 4, 0], nodes[m, 4, 1], nodes[m, 4, 2]
         ca_x[k], ca_y[k], ca_z[k] = nodes[m, 5, 0], nodes[m, 5, 1], nodes[m, 5, 2]
@@ -239,21 +237,21 @@ def rotate_nodes(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def load_weights(irradiance_radius, light, shading, begin, num, weight, reach):  # type: ignore[no-untyped-def]
-    """Look up irradiance and radius of listed lights [begin, begin + num).
+def load_weights(irradiance_radius, light, shading, weight, radius):  # type: ignore[no-untyped-def]
+    """Look up irradiance and radius of listed lights.
 
     Args:
-        irradiance_radius: irradiance, radius. (M, 4) light: (K,). shading: (1 or 3, K).
-        weight: irradiance · q cos θi, written. (3, ≥ num) reach: radius, written. (≥ num,)
+        irradiance_radius: irradiance, radius. (M, 4) light: (num,). shading: q cos θi. (1 or 3, num)
+        weight: irradiance · q cos θi, written. (3, ≥ num) radius: written. (≥ num,)
     """
     blue_row = shading.shape[0] - 1
     red, green, blue = weight[0], weight[1], weight[2]
-    for k in range(num):
-        m = np.uint32(light[begin + k])
-        red[k] = irradiance_radius[m, 0] * shading[0, begin + k]
-        green[k] = irradiance_radius[m, 1] * shading[blue_row // 2, begin + k]
-        blue[k] = irradiance_radius[m, 2] * shading[blue_row, begin + k]
-        reach[k] = irradiance_radius[m, 3]
+    for k in range(light.shape[0]):
+        m = np.uint32(light[k])
+        red[k] = irradiance_radius[m, 0] * shading[0, k]
+        green[k] = irradiance_radius[m, 1] * shading[blue_row // 2, k]
+        blue[k] = irradiance_radius[m, 2] * shading[blue_row, k]
+        radius[k] = irradiance_radius[m, 3]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)

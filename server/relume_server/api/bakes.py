@@ -24,13 +24,13 @@ from relume.store.bake_protocol import Plan, Recipe
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import Caller, CallerDep
 from relume_server.auth.services import PROXY_REVALIDATION_S
-from relume_server.errors import NotReadyError
 from relume_server.io.png import FOREVER, PngResponse
 from relume_server.schemas.base import Id
 from relume_server.schemas.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody, format_timestamp
 from relume_server.schemas.cameras import CameraBody
 from relume_server.services import Services, ServicesDep
 from relume_worker.cameras import resolve_views
+from relume_worker.jobs.job import NotReadyError
 from relume_worker.presets import PRESETS, resolve_num_probes
 from relume_worker.scenes import get_scene
 from relume_worker.status import FREE_CAMERA_METHODS, BakeState, BakeStatus, bake_id
@@ -147,7 +147,7 @@ def cancel_bake(bake: Id, services: ServicesDep, delete_files: bool = False) -> 
         services.bakes.delete(bake)
         services.access.quotas.disown("bake", bake)
     elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "canceled":
-        raise NotReadyError(f"the bake is {state}; nothing to cancel (?delete_files=true deletes it)")
+        raise NotReadyError(f"the bake is {state}, so there is nothing to cancel; ?delete_files=true deletes it")
     return Response(status_code=204)
 
 
@@ -162,7 +162,7 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
             raise NotFoundError(f"view {view[:80]!r} has a free camera; read its pixels in a session")
         fixed_view = cast("FixedViewTransfer", transfer).views[view]
         key, media_type = (bake, view, "materials"), PngResponse.media_type
-        return await services.answers.stream(key, lambda: png_bytes(fixed_view.material_ids()), media_type, FOREVER)
+        return await services.responses.stream(key, lambda: png_bytes(fixed_view.material_ids()), media_type, FOREVER)
 
 
 @router.get("/{bake}/environment.png", response_class=PngResponse, name="get_own_environment")

@@ -35,7 +35,7 @@ def get_camera(scene: Id, name: CameraName, services: ServicesDep) -> CameraEntr
     for entry in _entries(scene, services):
         if entry.name == name:
             return entry
-    raise NotFoundError(f"the scene has no camera {name[:80]!r}")
+    raise NotFoundError(f"the scene has no camera {name[:80]!r}; place it first")
 
 
 @router.put("/{name}", status_code=204, responses={201: {"description": "Created"}, 204: {"description": "Replaced"}})

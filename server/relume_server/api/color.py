@@ -53,4 +53,4 @@ async def get_lut(config: Id, display: ViewName, view: ViewName, services: Servi
     def read_table() -> NDArray[np.uint16]:
         return ocio_config.table(OcioView(display, view)).astype("<u2")
 
-    return await services.answers.stream((config, display, view), read_table, LutResponse.media_type, FOREVER)
+    return await services.responses.stream((config, display, view), read_table, LutResponse.media_type, FOREVER)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 from relume.live.fixed_camera.protocols import CameraMode, OpenBake
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
@@ -15,14 +15,13 @@ from relume_server.api.pagination import PageDep
 from relume_server.api.renders import baked_view, check_display, check_look, check_picture_size
 from relume_server.auth.roles import CallerDep
 from relume_server.batch.frame_sequence import comparison_camera
-from relume_server.errors import NotReadyError
 from relume_server.io.downloads import Download
 from relume_server.jobs.comparison_jobs import ComparisonJob
-from relume_server.jobs.job import JobFilter
 from relume_server.openapi import files
 from relume_server.schemas.base import Id, JobState
 from relume_server.schemas.bodies import ComparisonBody, ComparisonPlanBody, ComparisonRequest
 from relume_server.services import Services, ServicesDep
+from relume_worker.jobs.job import JobFilter, NotReadyError
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 Picture = Literal["error", "reference", "method-error", "method-reference"]
@@ -55,8 +54,8 @@ def _check(request: ComparisonRequest, transfer: OpenBake) -> None:
         comparison_camera(request, transfer)
         check_picture_size(request.size)
     elif request.camera is not None or request.size is not None:
-        allowed = "none, because this bake has fixed cameras"
-        raise ParameterError("camera" if request.size is None else "size", "given", allowed)
+        name = "camera" if request.size is None else "size"
+        raise ParameterError(name, Description("set"), f"no {name}, because this bake has fixed cameras")
     check_look(request.look, transfer, "/look")
     check_display(request.look, "/look")
 
@@ -110,8 +109,8 @@ def get_picture(
     job = services.comparisons.get(comparison)
     path = services.comparisons.picture_path(comparison, name)
     if not path.exists():
-        needed = "1 pass is" if name.endswith("reference") else "2 passes are"
-        raise NotReadyError(f"{needed} needed, {job.completed} done; try again later")
+        needed = "1 pass" if name.endswith("reference") else "2 passes"
+        raise NotReadyError(f"this image needs {needed}, and {job.completed} of {job.total} are done; try again later")
     return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
 
 

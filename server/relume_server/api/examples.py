@@ -35,7 +35,7 @@ async def import_example(name: ExampleName, services: ServicesDep, caller: Calle
     if name not in BUILT_IN:
         raise NotFoundError(f"there is no built-in scene {name[:80]!r}; choose from {', '.join(BUILT_IN)}")
     request = ImportRequest.create(services.settings, "built_in", None, name)
-    async with services.intake.reserving(caller.name, 0) as reservation:
-        identity = await services.intake.import_file(reservation, lambda folder: request)
+    async with services.import_queue.reserving(caller.name, 0) as reservation:
+        identity = await services.import_queue.import_file(reservation, lambda folder: request)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_scene_body, identity, services)

@@ -7,23 +7,23 @@ from typing import Annotated, TypeVar
 from pydantic import BaseModel, Field
 
 from relume_server.api.pagination import MAX_LONG, Key, Page, newest
-from relume_server.jobs.job import Job, JobFilter
-from relume_server.jobs.queue import JobQueue
 from relume_server.schemas.bodies import format_timestamp
+from relume_worker.jobs.job import Job, JobFilter
+from relume_worker.jobs.job_kind import JobKind
 
 Request = TypeVar("Request", bound=BaseModel)
 UserName = Annotated[str, Field(max_length=80)]
 
 
 def list_jobs(
-    queue: JobQueue[Request],
+    kind: JobKind[Request],
     job_filter: JobFilter,
     page: Page,
     default_limit: int = MAX_LONG,
     *,
     newest_first: bool = True,
 ) -> list[Job[Request]]:
-    """Return a page of a queue's jobs. default_limit: number without a `limit`."""
+    """Return a page of the jobs of a kind. default_limit: number without a `limit`."""
 
     def key(job: Job[Request]) -> Key:
         return newest(job.created, job.id) if newest_first else (job.created, job.id)
@@ -33,7 +33,7 @@ def list_jobs(
     if page.after is not None:
         created, identity = float(page.after[0]), str(page.after[1])
         after = -created if newest_first else created, identity
-    jobs = queue.page(job_filter, page.default_limit(default_limit) + 1, after, newest_first=newest_first)
+    jobs = kind.page(job_filter, page.default_limit(default_limit) + 1, after, newest_first=newest_first)
     return page.cut(jobs, key)
 
 

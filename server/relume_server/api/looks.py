@@ -56,7 +56,7 @@ async def put_look(
     `created` keeps the position in lists of a look that is renamed or restored.
     """
     if if_none_match not in (None, "*"):
-        raise ParameterError("If-None-Match", if_none_match, "* or nothing")
+        raise ParameterError("If-None-Match", if_none_match, "*, or leave it out")
     name, document = check_name(name), parse_document(await request.body())
     since = None if created is None else created.timestamp()
     look, is_new = await run_in_threadpool(services.looks.put, name, document, if_match, if_none_match, since)

@@ -66,7 +66,7 @@ class Page:
 
         Args:
             entries: the whole list, or at least the page and one more entry.
-            key: of an entry; lower keys come first.
+            key: returns the sort key of an entry; lower keys come first.
         Raises:
             ParameterError: `after` belongs to another list.
         """
@@ -143,7 +143,7 @@ def check_query(request: Request) -> None:
             allowed = (
                 f"only {', '.join(allowed_names)}"
                 if allowed_names
-                else "none, because this call has no query parameters"
+                else "no query parameter, because this call has none"
             )
             raise ParameterError(f"query parameter {name[:80]}", request.query_params[name], allowed)
 

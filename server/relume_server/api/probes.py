@@ -49,7 +49,7 @@ async def get_probe_array(
     async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
         _, arrays = services.live.library.shader_arrays(_require_free_camera(transfer))
         read_array = partial(_read_array, arrays, array)
-        return await services.answers.stream((bake, array), read_array, ArrayResponse.media_type, FOREVER)
+        return await services.responses.stream((bake, array), read_array, ArrayResponse.media_type, FOREVER)
 
 
 def _require_free_camera(transfer: OpenBake) -> OpenBake:

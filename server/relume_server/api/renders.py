@@ -10,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume import look as looks
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.image_io.ocio.active_config import get_config
 from relume.image_io.ocio.view import OcioView
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, OpenBake
@@ -21,10 +21,8 @@ from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import PageDep
 from relume_server.auth.roles import Caller, CallerDep
 from relume_server.batch.frame_sequence import check_animation, look_at_frame, look_document_at_frame, with_pivot
-from relume_server.errors import NotReadyError
 from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
-from relume_server.jobs.job import JobFilter, new_id
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
 from relume_server.openapi import files
 from relume_server.schemas.base import MAX_NAME, Id, JobState, Name
@@ -41,6 +39,7 @@ from relume_server.schemas.renders import (
     RenderRequest,
 )
 from relume_server.services import Services, ServicesDep
+from relume_worker.jobs.job import JobFilter, NotReadyError, new_id
 from relume_worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
@@ -78,7 +77,7 @@ def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Ser
 async def frame_looks(request: LooksRequest, services: ServicesDep) -> LooksBody:
     """Look and camera of each frame of an animation, so that an editor plays exactly what will be rendered."""
     if request.num_frames > MAX_LISTED_FRAMES:
-        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} for this call")
+        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} frames for this call")
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         return await run_in_threadpool(_frame_looks, request, transfer)
@@ -93,7 +92,7 @@ def _frame_looks(request: LooksRequest, transfer: OpenBake) -> LooksBody:
         documents.append(dict(look_document_at_frame(request, request.view, transfer, index)))
         num_chars += len(json.dumps(documents[-1]))
         if num_chars > MAX_LISTED_BYTES:
-            raise ParameterError("frames", request.num_frames, f"at most {index} with looks of this size")
+            raise ParameterError("frames", request.num_frames, f"at most {index} frames with looks of this size")
     return LooksBody(looks=documents, cameras=cameras)
 
 
@@ -110,8 +109,8 @@ def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame
 
 def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
     if len(request.looks) > request.num_frames:
-        allowed = f"at most one per frame, {request.num_frames}"
-        raise ParameterError("looks", f"{len(request.looks)} keyframes", allowed)
+        value = Description(f"a list of {len(request.looks)} looks")
+        raise ParameterError("looks", value, f"at most one look per frame, {request.num_frames} in total")
     for index, partial in enumerate(request.looks):
         check_look(partial, transfer, f"/looks/{index}")
 
@@ -228,7 +227,7 @@ def retry_frame(render: Id, index: FrameIndex, services: ServicesDep) -> RenderB
 def _job_with_frame(identity: str, index: int, services: Services) -> RenderJob:
     job = services.renders.get(identity)
     if index >= job.total:
-        raise NotFoundError(f"this batch has {job.total} frames, numbered from 0")
+        raise NotFoundError(f"this batch has no frame {index}; choose from 0 to {job.total - 1}")
     return job
 
 

@@ -12,7 +12,7 @@ from typing import Annotated
 from fastapi import APIRouter, File, Form, Query, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.core.folder_size import folder_bytes
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import CallerDep
@@ -75,7 +75,7 @@ async def import_scene(
         raise ParameterError("name", name, "printable characters")
     if len(companions) > MAX_COMPANIONS or any(len(each.filename or "") > MAX_PATH for each in companions):
         allowed = f"at most {MAX_COMPANIONS} files with names of at most {MAX_PATH:,} characters"
-        raise ParameterError("companions", f"{len(companions)} files", allowed)
+        raise ParameterError("companions", Description(f"a list of {len(companions)} files"), allowed)
     called = name.strip() or plain_stem(scene.filename) or "Scene"
 
     def make_request(folder: Path) -> ImportRequest:
@@ -90,7 +90,7 @@ async def import_scene(
         )
         return replace(request, ground=ground)
 
-    identity = await services.intake.import_file(reservation, make_request)
+    identity = await services.import_queue.import_file(reservation, make_request)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_scene_body, identity, services)
 
@@ -101,8 +101,10 @@ async def add_ground(scene: Id, services: ServicesDep, caller: CallerDep, respon
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     folder = await run_in_threadpool(fetch_if_missing, scene_path(services.settings.data, scene))
     request = ImportRequest.create(services.settings, "grounded", folder, f"{record.name[:185]} on a ground")
-    async with services.intake.reserving(caller.name, await run_in_threadpool(folder_bytes, folder)) as reservation:
-        identity = await services.intake.import_file(reservation, lambda _: request)
+    async with services.import_queue.reserving(
+        caller.name, await run_in_threadpool(folder_bytes, folder)
+    ) as reservation:
+        identity = await services.import_queue.import_file(reservation, lambda _: request)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_scene_body, identity, services)
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume import look as looks
-from relume.assets import environments
+from relume.assets.environments.environment_names import environment_exists
 from relume.assets.measured.measured_store import STORE as MEASURED
 from relume.core.errors import NotFoundError
 from relume.live.fixed_camera.protocols import OpenBake
@@ -98,6 +98,6 @@ def _missing_assets(document: dict[str, Any], services: Services) -> list[str]:
         for name in measured
         if not MEASURED.exists(name)
     ]
-    if map_name is not None and not environments.environment_exists(map_name):
+    if map_name is not None and not environment_exists(map_name):
         missing.append(f"The environment {map_name} of this link was deleted; import it again.")
     return missing

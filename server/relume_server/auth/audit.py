@@ -27,8 +27,8 @@ class Change:
     """A change that a user made.
 
     Attributes:
-        who: name, or address without login. role: of the user at that time. address: of the client.
-        what: method and path, or words. object: created, or named by the path. status: of the response.
+        who: name, or address without login. role: role of the user at that time. address: address of the client.
+        what: method and path, or words. object: created, or named by the path. status: status of the response.
         request: id of the request.
     """
 
@@ -81,7 +81,7 @@ class Audit:
         """List rows, newest first.
 
         Args:
-            limit: maximum number. before: only rows with a smaller number. actor: only of this user.
+            limit: maximum number. before: only rows with a smaller number. actor: only rows of this user.
         """
         query = select(AuditRow).order_by(AuditRow.number.desc()).limit(min(limit, MAX_LISTED))
         if before is not None:

@@ -81,7 +81,9 @@ class Identity:
         is_guess, bucket = not tokens.is_cached(text), bucket_name(address)
         wait_s = self._unknown.take(bucket) if is_guess else 0.0
         if wait_s > 0.0:
-            raise RateError(f"too many wrong tokens; wait {max(wait_s, 0.1):.1f} s, then send a right one", wait_s)
+            raise RateError(
+                f"you sent too many wrong tokens; wait {max(wait_s, 0.1):.1f} s, then send a right one", wait_s
+            )
         token = await run_sync(tokens.authenticate, text)
         if token is None:
             return None

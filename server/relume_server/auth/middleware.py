@@ -41,11 +41,11 @@ _UNCHANGED = 200
 
 
 class AuthMiddleware:
-    """Middleware between the guard, which knows no callers, and the routes.
+    """Middleware between `RequestLimits`, which knows no callers, and the routes.
 
     Args:
-        app: of the routes. settings: of the server. access: called for each request, because it is opened after the app
-            is created. clock: monotonic seconds.
+        app: application of the routes. settings: settings of the server.
+        access: called for each request, because it is opened after the app is created. clock: monotonic seconds.
     """
 
     def __init__(
@@ -107,7 +107,9 @@ class AuthMiddleware:
     def _count(self, name: str) -> None:
         wait_s = 0.0 if self._buckets is None else self._buckets.take(name)
         if wait_s > 0.0:
-            raise RateError(f"too many requests; wait {max(wait_s, 0.1):.1f} s, and make them less often", wait_s)
+            raise RateError(
+                f"you sent too many requests; wait {max(wait_s, 0.1):.1f} s, and send them less often", wait_s
+            )
 
     def _required_role(self, method: str, path: str) -> Role:
         return Role.VIEW if self._viewers_comment and is_comment(method, path) else required_role(method, path)
@@ -117,7 +119,7 @@ class AuthMiddleware:
         if caller.role >= role:
             return
         if caller.role is Role.ANYONE:
-            raise LoginError("login required: send a token as Authorization: Bearer, or log in in the editor")
+            raise LoginError("a login is required; send a token as Authorization: Bearer, or log in in the editor")
         raise ForbiddenError(
             f"{caller.name} has the role {caller.role.label}, this needs {role.label}; ask an admin for such a token"
         )

@@ -16,9 +16,10 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume.core.errors import bytes_text
 from relume_server.auth.roles import Caller
 from relume_server.auth.tables import OwnedRow
-from relume_server.errors import BusyError, NearlyFullError, QuotaError
+from relume_server.errors import NearlyFullError
 from relume_server.runtime.disk_space import free_bytes
 from relume_worker.database.models import BakeRow
+from relume_worker.jobs.job import BusyError, QuotaError
 
 if TYPE_CHECKING:
     from relume_server.settings import Settings
@@ -36,7 +37,7 @@ class Quotas:
     Identical content is stored once, and belongs to the first user only.
 
     Attributes:
-        settings: of the server.
+        settings: settings of the server.
         deciding: lock for checking and counting in one step, so that concurrent calls cannot both pass a limit.
     """
 

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from relume.core.errors import bytes_text
-from relume_server.errors import NearlyFullError, QuotaError
+from relume_server.errors import NearlyFullError
 from relume_server.runtime.disk_space import free_bytes
+from relume_worker.jobs.job import QuotaError
 
 if TYPE_CHECKING:
     from relume_server.auth.quotas import OwnedKind, Quotas
@@ -26,7 +27,7 @@ class Reservation:
     well, count it. Used by one thread at a time.
 
     Args:
-        quotas: of all users. owner: of the upload.
+        quotas: quotas of all users. owner: user who uploads.
     """
 
     def __init__(self, quotas: Quotas, owner: str) -> None:
@@ -61,7 +62,7 @@ class Reservation:
         """Return the error for a file that unpacks to more than `max_import_bytes`."""
         if self._quotas.remaining_bytes(self.owner) is None:
             return NearlyFullError(
-                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more space"
+                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more; free some space"
             )
         return QuotaError(
             f"the file unpacks to more than the {bytes_text(limit_bytes)} left in your quota; delete a scene, a "

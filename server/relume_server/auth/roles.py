@@ -35,9 +35,9 @@ class Caller:
     """The sender of a request.
 
     Attributes:
-        name: for quotas, scheduling and audit; empty without login. Names from proxies begin with `PROXY`, which no
-            token's name does: a proxy's Ann is not the owner of Ann's token.
-        role: of the caller. address: of the client.
+        name: name for quotas, scheduling and audit; empty without login. Names from proxies begin with `PROXY`, which
+            no token's name does: a proxy's Ann is not the owner of Ann's token.
+        role: role of the caller. address: address of the client.
         auth_method: no login required, not logged in, by token, or by proxy.
         token: id of the token. watches: joined by a view-only link.
     """

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from sqlalchemy import select
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import NotFoundError, ParameterError, RelumeError
 from relume_server.auth.roles import PROXY, ROLES, Role
 from relume_server.auth.tables import TokenRow
 
@@ -58,7 +58,7 @@ class TokenStore:
             ParameterError: unknown role, invalid name, or name of a valid token.
         """
         if role not in ROLES:
-            raise ParameterError("role", role, ", ".join(ROLES))
+            raise ParameterError("role", role, "one of " + ", ".join(ROLES))
         if not (name.isprintable() and name == name.strip() and 1 <= len(name) <= 80):
             raise ParameterError("name", name, "1 to 80 printable characters")
         if name.startswith(PROXY):
@@ -66,12 +66,12 @@ class TokenStore:
                 "name", name, f"a name that does not begin with {PROXY}, which is for names from proxies"
             )
         if days is not None and not 0 < days <= 36_500:
-            raise ParameterError("days", days, "more than 0, at most 36500")
+            raise ParameterError("days", days, "a number above 0, at most 36500")
         now, tokens = time.time(), self.all()
         if any(token.name == name and token.is_valid(now) for token in tokens):
             raise ParameterError("name", name, "another name, or revoke the valid token of this name first")
         if len(tokens) >= MAX_TOKENS:
-            raise ParameterError("name", name, f"none: the limit of {MAX_TOKENS:,} tokens is reached")
+            raise RelumeError(f"the limit of {MAX_TOKENS:,} tokens, revoked ones included, is reached; use a valid one")
         identity, secret = secrets.token_hex(_ID_DIGITS // 2), secrets.token_urlsafe(32)
         expires = None if days is None else now + days * 86_400
         with self._sessions.begin() as session:

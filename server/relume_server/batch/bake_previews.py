@@ -36,8 +36,8 @@ def paint_thumbnail(
     """Render the thumbnail of a bake's first view.
 
     Args:
-        context: of the process. report, is_canceled: callbacks. bake: id.
-        path: of the file, which appears when it is complete; an existing one is kept.
+        context: context of the process. report, is_canceled: callbacks. bake: id.
+        path: path of the file, which appears when it is complete; an existing one is kept.
     """
     file = Path(path)
     if file.exists():  # another request was faster

@@ -37,7 +37,7 @@ class SandboxedViewArrays:
     """Images of a file; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        file: ZIP or container. max_bytes: memory limit. seconds: of processor time per view.
+        file: ZIP or container. max_bytes: memory limit. seconds: seconds of processor time per view.
     Raises:
         MaterialError: the file cannot be used.
     """

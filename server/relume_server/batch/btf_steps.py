@@ -18,7 +18,6 @@ from relume.synthetic_btf.synthesize import MESH, SyntheticBtf, synthesize_btf
 from relume_server.batch.btf_images import SandboxedViewArrays
 from relume_server.batch.context import BatchContext
 from relume_server.schemas.btfs import BtfRequest
-from relume_server.settings import Settings
 from relume_worker.paths import btfs_path
 
 UPLOAD_FILE, RESULT_FILE = (
@@ -41,7 +40,7 @@ def run_btf_slice(
     """Render or read a BTF, compress and store it; an interrupted step saves its results.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         request: body of the job. folder: its files, including uploads.
     Returns:
         `is_done`: whether the BTF is stored; otherwise the step must run again.
@@ -49,7 +48,7 @@ def run_btf_slice(
     btf_request, job_folder = BtfRequest.model_validate(request), Path(folder)
     time_slice = _TimeSlice(report, is_canceled, job_folder / _PROGRESS_FILE)
     try:
-        record = _make_record(btf_request, job_folder, btfs_path(context.data), time_slice)
+        record = _make_record(btf_request, job_folder, context, time_slice)
     except CancelledError:
         if is_canceled():
             raise
@@ -60,12 +59,10 @@ def run_btf_slice(
     return {"is_done": True}
 
 
-def _make_record(request: BtfRequest, job_folder: Path, btfs_folder: Path, time_slice: _TimeSlice) -> BtfRecord:
+def _make_record(request: BtfRequest, job_folder: Path, context: BatchContext, time_slice: _TimeSlice) -> BtfRecord:
+    btfs_folder, limits = btfs_path(context.data), context.import_limits
     if request.geometry is None:
-        limits = Settings()  # of the server's process
-        with closing(
-            SandboxedViewArrays(job_folder / UPLOAD_FILE, limits.import_bytes, limits.import_seconds)
-        ) as images:
+        with closing(SandboxedViewArrays(job_folder / UPLOAD_FILE, *limits)) as images:
             options = (
                 request.name,
                 request.error,

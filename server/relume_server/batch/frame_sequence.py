@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from relume import look as looks
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 from relume.live.fixed_camera.protocols import CameraMode, CameraView, OpenBake
 from relume.look import Look
 from relume.look.interpolate import enclosing_keyframes, interpolate_looks
@@ -34,13 +34,14 @@ def check_animation(request: Animation, view: str, transfer: OpenBake) -> Sequen
     """
     path, num_frames = request.path, request.num_frames
     if path is not None and transfer.camera_mode is not CameraMode.FREE and not _has_fixed_camera(path):
-        allowed = "no path, or bake with method probes: this bake has fixed cameras"
+        allowed = "no path, because this bake has fixed cameras, or bake the scene with method probes"
         raise ParameterError("path", _path_text(path), allowed)
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
         raise ParameterError("frames", request.frames, f"{path.turntable}, as in turntable, or leave it out")
     num_cameras = 0 if path is None or isinstance(path, Turntable) else len(path.cameras)
     if num_cameras > num_frames:
-        raise ParameterError("path/cameras", f"{num_cameras} keyframes", f"at most one per frame, {num_frames}")
+        value = Description(f"a list of {num_cameras} cameras")
+        raise ParameterError("path/cameras", value, f"at most one camera per frame, {num_frames} in total")
     return cameras_of(request, view, transfer)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from relume.core.filesystem import UNFINISHED, atomic_write
+from relume.core.filesystem import atomic_write
 from relume.image_io.downsample import downsample
 from relume.image_io.write_image import write_image
 from relume.live.fixed_camera.jobs import CancelCheck
@@ -26,8 +25,6 @@ from relume_server.schemas.renders import RenderRequest
 if TYPE_CHECKING:
     from relume.scene.model import Camera
 
-_LAYERS = ".layers-*"  # folders next to an image that is being written
-
 
 def paint_frame(
     context: BatchContext,
@@ -42,12 +39,12 @@ def paint_frame(
     """Render one image of a batch.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
-        request: body of the batch. index: of the image. path: of its file, which appears when it is complete.
+        context: context of the process. report, is_canceled: callbacks.
+        request: body of the batch. index: index of the image.
+        path: path of its file, which appears when it is complete.
         scene_name: stored in the file.
     """
     render_request, target = RenderRequest.model_validate(request), Path(path)
-    _tidy(target.parent)
     transfer = context.transfer(render_request.bake)
     camera = cameras_of(render_request, render_request.view, transfer)[index]
     view = transfer.views[render_request.view]
@@ -70,14 +67,6 @@ def paint_frame(
     else:
         write_image(target, render(look, report), look.display.exposure, look.display.tone_map)
     return {}
-
-
-def _tidy(folder: Path) -> None:
-    """Remove files of a killed process: a batch renders one image at a time."""
-    for stray in folder.glob(_LAYERS):
-        shutil.rmtree(stray, ignore_errors=True)
-    for unfinished in folder.glob(UNFINISHED):
-        unfinished.unlink(missing_ok=True)
 
 
 def _export(
@@ -112,7 +101,7 @@ def pack(
     """Pack a finished batch.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         frames: path and archive name of each image. archive: file to write.
         video: video file to write, or None. fps: its frames per second.
     """

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from relume.core.errors import CancelledError, NotFoundError, RelumeError
 from relume.core.source_hash import image_code
-from relume_server.batch.step import RunStep, Step
 from relume_server.batch.thumbnails import Thumbnails
 from relume_worker.database.failures import DatabaseError
+from relume_worker.jobs.step import RunStep, Step
 from relume_worker.ledger import Ledger
 from relume_worker.paths import bake_path
 from relume_worker.status import FREE_CAMERA_METHODS
@@ -38,7 +38,7 @@ class Prewarmer:
     ) -> None:
         """
         Args:
-            data: data directory. ledger: of bakes. run: runs steps. thumbnails: of bakes.
+            data: data directory. ledger: ledger of bakes. run: runs steps. thumbnails: thumbnails of bakes.
             is_used: true if a bake is open, so that its images are rendered anyway.
         """
         self._data, self._ledger, self._run_step = data, ledger, run

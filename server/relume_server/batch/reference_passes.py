@@ -29,9 +29,9 @@ from relume.methods.view_stages import MIN_SIDE
 from relume.reference.comparison import Comparison, Estimate, compare, error_map
 from relume_server.batch.context import BatchContext
 from relume_server.batch.frame_sequence import comparison_camera
-from relume_server.batch.step_timer import estimate_seconds
 from relume_server.runtime.protocols import F32
 from relume_server.schemas.bodies import ComparisonRequest
+from relume_worker.jobs.step_timer import estimate_seconds
 from relume_worker.paths import scene_path
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def make_frame(
     """Render the frame to compare, and a first reference image, if they are missing.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         request: body of the comparison. folder: its files.
     Returns:
         `passes`: number of finished passes.
@@ -110,7 +110,7 @@ def make_pass(
     """Add one pass.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         request: body of the comparison. folder: its files, from `make_frame`.
     Returns:
         `passes`: number of finished passes.
@@ -139,7 +139,7 @@ def time_pass(
     """Measure the time of a pass with a small image.
 
     Args:
-        context: of the process. report, is_canceled: callbacks. request: body of the comparison.
+        context: context of the process. report, is_canceled: callbacks. request: body of the comparison.
     Returns:
         `seconds` per pass.
     """

@@ -12,8 +12,8 @@ from relume_server.batch import bake_previews, btf_steps
 from relume_server.batch.context import BatchContext
 from relume_server.batch.frames import pack, paint_frame
 from relume_server.batch.reference_passes import make_frame, make_pass, time_pass
-from relume_server.batch.step import Step
-from relume_server.batch.step_claim import canceled_or_taken_over
+from relume_worker.jobs.claim import canceled_or_taken_over
+from relume_worker.jobs.step import Step
 
 STEPS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "BTF": btf_steps.run_btf_slice,
@@ -31,8 +31,8 @@ def do_step(context: BatchContext, step: Step, report: ProgressCallback, is_canc
     """Run one step in this process.
 
     Args:
-        context: of the process.
-        step: of a registered kind.
+        context: context of the process.
+        step: step of a registered kind.
         report: called with the fraction done. is_canceled: polled.
     Raises:
         CancelledError: `is_canceled` returned true, or another server has taken the job over. Also what the step

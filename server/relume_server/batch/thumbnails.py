@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from relume.core.source_hash import image_code
-from relume_server.batch.step import RunStep, Step
 from relume_server.runtime.single_flight import SingleFlight
+from relume_worker.jobs.step import RunStep, Step
 
 NUM_WAITING = 2
 """Threads that wait for steps; more would only wait for the processes."""
@@ -16,7 +16,7 @@ class Thumbnails:
     """Files in a folder, rendered if they are missing.
 
     Args:
-        folder: of the files. run: runs steps.
+        folder: folder of the files. run: runs steps.
     """
 
     def __init__(self, folder: Path, run: RunStep) -> None:

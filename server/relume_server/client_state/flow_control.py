@@ -86,7 +86,7 @@ class FrameWindow:
         """True if frames of this size would stutter on this connection.
 
         Args:
-            num_bytes: of a frame. was_slow: result for the previous frame, for hysteresis.
+            num_bytes: size in bytes of a frame. was_slow: result for the previous frame, for hysteresis.
         """
         if self._bytes_per_s is None:
             return was_slow

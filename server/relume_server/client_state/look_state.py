@@ -35,7 +35,7 @@ class LookState:
             EditError, ParameterError: the look is unchanged.
         """
         if message.revision <= self.revision:
-            raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; send a larger one")
+            raise EditError(f"revision {message.revision} is not newer than {self.revision}; send a larger one")
         patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
         document = looks.apply_patch(self.document, patch, self.default)
         if message.active_control is not None:

@@ -19,7 +19,7 @@ class PendingRequests:
         space: width and height of the client's area for a single view; None: unlimited.
         camera_states: newest free camera of each view; kept.
         regions: visible region of each view, if set: x, y, width, height in pixels.
-        renderer: who renders free-camera views while they move.
+        renderer: the side that renders free-camera views while the camera moves.
         prepare_curve, active_parameter: pointers of the opened curve, and of the parameter that is dragged.
     """
 

@@ -1,4 +1,4 @@
-"""The look that a session shall show, and the time of its request."""
+"""The look that a session should show, and the time of its request."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CameraState:
     """Requested camera of a free-camera view.
 
     Attributes:
-        seq: repeated in frames. size: of the image, pixels. received_s: time of the message.
+        seq: repeated in frames. size: size of the image, pixels. received_s: time of the message.
         is_idle: an exact image follows when nothing else is left to do.
     """
 

@@ -45,5 +45,5 @@ class VisibleViews:
     def check(self, name: str) -> str:
         """Return the name of a visible view. Raises ParameterError for any other."""
         if name not in self.names:
-            raise ParameterError("view", name, ", ".join(self.names)[:400] + ", which are shown")
+            raise ParameterError("view", name, "one of the displayed views: " + ", ".join(self.names)[:400])
         return name

@@ -21,7 +21,7 @@ class CommentSync:
     """Polls while the server runs; the database is queried only while there are rooms.
 
     Args:
-        rooms: of this server. marks: of some scenes. threads: for the query; for short work only.
+        rooms: rooms of this server. marks: marks of some scenes. threads: threads for the query; for short work only.
     """
 
     def __init__(self, rooms: Rooms, marks: Callable[[Collection[str]], Marks], threads: Executor) -> None:

@@ -18,7 +18,7 @@ class JoinRequest:
     Attributes:
         room: id; None for view-only clients.
         view_token: opens the room view-only; derived from the id, which cannot be derived from it.
-        participant_token: of an earlier session. name: display name.
+        participant_token: participant token of an earlier session. name: display name.
     """
 
     room: str | None
@@ -36,7 +36,7 @@ def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | 
     """Parse the room of an `open` message; None if it has none.
 
     Args:
-        opening: the message. room_prefix: in the URL.
+        opening: the message. room_prefix: room prefix in the URL.
     Raises:
         ParameterError: the name is not printable, or the URL has another prefix.
     """

@@ -1,7 +1,7 @@
 """One session in a room: its edits go to all others, and theirs come to it.
 
-A client knows its own edits. It is sent the difference between its look and the room's, computed when it can be sent:
-however many edits there are, and however slowly a client reads, nothing accumulates.
+A client knows its own edits. It receives the difference between its look and the room's, computed when it can be sent:
+nothing accumulates, however many edits there are and however slowly the client reads.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class RoomMember:
     """Connects a session to its room. Event loop only.
 
     Args:
-        entry: of the room. look, pending: of the session, updated by others' edits. may_edit: more than view settings.
+        entry: entry of the room. look, pending: look and pending requests of the session, updated by others' edits.
+        may_edit: the session may edit more than view settings.
     Attributes:
         changed: set when something is to be sent. has_comments: comments have changed.
     """
@@ -91,7 +92,7 @@ class RoomMember:
         """Pass the session's accepted edit on to all others, unless it changes view settings only.
 
         Args:
-            target: after the edit. patch: of the edit, as sent by the client.
+            target: target after the edit. patch: JSON Patch of the edit, as sent by the client.
         Returns:
             The target to show here, with its `room_revision`.
         """

@@ -16,7 +16,7 @@ class Participant:
     """A person in a room.
 
     Attributes:
-        id: from 1 on, in joining order. num_sessions: open ones.
+        id: from 1 on, in joining order. num_sessions: number of open sessions.
         name: display name. owner: user for quotas; empty without login.
         removal: timer that removes the participant when no session is open.
     """

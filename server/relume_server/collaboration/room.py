@@ -12,8 +12,8 @@ from relume_server.auth.roles import Caller
 from relume_server.client_state.target import Target
 from relume_server.collaboration.join import JoinRequest
 from relume_server.collaboration.participant import COLORS, Participant
-from relume_server.errors import BusyError
 from relume_server.schemas.rooms import Person
+from relume_worker.jobs.job import BusyError
 
 LOCAL_SECTIONS = ("display", "transport")
 """View settings: sections of a look that are not shared."""
@@ -75,7 +75,7 @@ class Room:
 
     def _add_participant(self, join_request: JoinRequest, caller: Caller) -> Participant:
         if len(self._participants) >= self._max_people:
-            raise BusyError(f"{self._max_people} people are in this room, its limit; wait until one leaves")
+            raise BusyError(f"{self._max_people} people are in this room, which is its limit; wait until one leaves")
         self._num_joined += 1
         used_colors = {participant.color for participant in self._participants.values()}
         color = next((color for color in COLORS if color not in used_colors), COLORS[self._num_joined % len(COLORS)])

@@ -27,8 +27,8 @@ class RoomLease:
     """Holds the leases of this server's rooms. Event loop only.
 
     Args:
-        rooms: of this server. leases: in the database. drain: when the server drains, its rooms are free.
-        threads: for leases; for short work only.
+        rooms: rooms of this server. leases: leases in the database. drain: when the server drains, its rooms are free.
+        threads: threads for leases; for short work only.
     """
 
     def __init__(self, rooms: Rooms, leases: RoomLeases, drain: DrainState, threads: Executor) -> None:

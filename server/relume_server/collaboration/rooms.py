@@ -10,8 +10,8 @@ from relume_server.auth.roles import Caller, Role
 from relume_server.collaboration.join import JoinRequest
 from relume_server.collaboration.member import RoomEntry
 from relume_server.collaboration.room import Room, with_local_settings
-from relume_server.errors import BusyError
 from relume_server.schemas.rooms import ROOM_PREFIX
+from relume_worker.jobs.job import BusyError
 
 Key = tuple[str, str]
 
@@ -35,7 +35,7 @@ class Rooms:
         """Join a room; an editor creates it if it does not exist, with the look of the session.
 
         Args:
-            join_request: of the session. scene: id. caller: of the session.
+            join_request: join request of the session. scene: id. caller: caller of the session.
             initial_document: complete look of the session.
             has_local_settings: keep the session's own view settings, from a lost session.
         Raises:
@@ -48,7 +48,7 @@ class Rooms:
             if caller.role < Role.EDIT:
                 raise BusyError("this room is empty; it opens when an editor joins")
             if len(self._rooms) >= self._max_rooms:
-                raise BusyError(f"{self._max_rooms} rooms are open, the limit; wait until one is closed")
+                raise BusyError(f"{self._max_rooms} rooms are open, which is the limit; wait until one is closed")
             room = Room(dict(initial_document), self._max_people, self._away_seconds, partial(self._discard, key))
         participant = room.join(join_request, caller)
         self._rooms[key] = room

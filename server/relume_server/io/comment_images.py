@@ -9,7 +9,7 @@ import warnings
 
 from PIL import Image
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 
 MAX_SIDE = 1024
 STORED_SIDE = 320
@@ -35,7 +35,7 @@ def small_picture(text: str) -> bytes:
     except (binascii.Error, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         if isinstance(error, ParameterError):
             raise
-        raise ParameterError("picture", "unreadable", "a PNG, JPEG or WebP in Base64") from None
+        raise ParameterError("picture", Description("not a readable image"), "a PNG, JPEG or WebP in Base64") from None
     small.thumbnail((STORED_SIDE, STORED_SIDE))
     written = io.BytesIO()
     small.save(written, "WEBP", quality=82)

@@ -8,28 +8,28 @@ from collections import Counter
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
-from relume_worker.fair_share import FairShare, WaitingBake
+from relume_worker.jobs.fair_share import FairShare, Waiting
 
 
 class Slots:
     """Slots for concurrent work. Event loop only.
 
     Args:
-        num_slots: total. max_per_client: maximum of one client.
-        weights: of clients, see `relume_worker.fair_share.FairShare`.
+        num_slots: total number of slots. max_per_client: maximum number of slots that one client holds.
+        weights: weights of clients, see `relume_worker.jobs.fair_share.FairShare`.
     """
 
     def __init__(self, num_slots: int, max_per_client: int, weights: Mapping[str, float]) -> None:
         self._free, self._each = num_slots, max_per_client
         self._fair_share, self._numbers = FairShare(weights), itertools.count()
         self._num_held = Counter[str]()
-        self._waiting: dict[WaitingBake, asyncio.Future[None]] = {}
+        self._waiting: dict[Waiting, asyncio.Future[None]] = {}
 
     @asynccontextmanager
     async def acquire(self, client: str) -> AsyncIterator[None]:
         """Wait for a slot, and hold it inside the block."""
         number = next(self._numbers)
-        ticket, granted = WaitingBake(str(number), client, False, number), asyncio.get_running_loop().create_future()
+        ticket, granted = Waiting(str(number), client, False, number), asyncio.get_running_loop().create_future()
         self._waiting[ticket] = granted
         self._grant_slots()
         try:

@@ -42,7 +42,7 @@ _STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
 }
 
 
-class Intake:
+class ImportQueue:
     """Imports for routes.
 
     Attributes:
@@ -74,8 +74,8 @@ class Intake:
         """Import a file, assign it to its owner, and return its id.
 
         Args:
-            reservation: of the upload. make_request: writes files into an empty folder, in a thread, and describes
-                them.
+            reservation: reservation of the upload.
+            make_request: writes files into an empty folder, in a thread, and describes them.
         Raises:
             QuotaError, NearlyFullError: the unpacked result is too large; nothing is stored.
             Also what `Importers.run` raises.

@@ -41,11 +41,12 @@ class ImportRequest:
         kind, file: kind and path; no path for a built-in scene; for a scene to be "grounded" its folder. A "tile" for a
             BTF is validated only, and has no id.
         environment: path of a scene's environment map, or None.
-        name: display name; of a built-in scene its key.
+        name: display name; for a built-in scene, its key.
         scene: file name of a scene or a material, with folders.
         companions: paths of a scene's companion files, by name.
         ground: whether to add a ground plane. period: side of one period, meters, if known.
-        seconds: limit of processor and wall time. max_bytes: of address space. max_file_bytes: of each written file.
+        seconds: limit of processor and wall time. max_bytes: maximum size in bytes of address space.
+        max_file_bytes: maximum size in bytes of each written file.
     """
 
     into: str

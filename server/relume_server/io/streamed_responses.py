@@ -46,11 +46,11 @@ class _File:
             yield piece
 
 
-class Answers:
+class StreamedResponses:
     """Large responses of one server. Event loop only.
 
     Args:
-        folder: on the disk for the files.
+        folder: folder on the disk for the files.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -70,5 +70,5 @@ class Answers:
         return StreamingResponse(file.chunks(self._readers), media_type=media_type, headers={**headers, **length})
 
     def close(self) -> None:
-        """Create no more."""
+        """Accept no more requests."""
         self._single_flight.close()

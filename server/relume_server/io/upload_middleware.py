@@ -17,9 +17,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from relume_server.auth.reservations import Reservation
 from relume_server.auth.roles import KEY
 from relume_server.auth.services import AuthServices
-from relume_server.errors import NearlyFullError, QuotaError, make_problem, problem_response
+from relume_server.errors import NearlyFullError, make_problem, problem_response
 from relume_server.io.fair_slots import Slots
 from relume_server.request_limits import UPLOADS
+from relume_worker.jobs.job import QuotaError
 
 MEASURED = "/api/materials/measured"
 UPLOADS_AT_ONCE, UPLOADS_EACH = 64, 8
@@ -33,8 +34,8 @@ class UploadMiddleware:
     """Middleware for uploads.
 
     Args:
-        app: to protect. access: called for each upload, because it is opened after the app is created.
-        max_per_user: concurrent uploads of one user; others wait. weights: of users in scheduling.
+        app: application to protect. access: called for each upload, because it is opened after the app is created.
+        max_per_user: concurrent uploads of one user; others wait. weights: weights of users in scheduling.
     """
 
     def __init__(

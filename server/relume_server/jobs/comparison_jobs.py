@@ -8,17 +8,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
-from sqlalchemy.orm import Session, sessionmaker
+from pydantic import Field, ValidationError
 
 from relume_server.batch.reference_passes import FIGURES
-from relume_server.batch.step import RunStep, Step
-from relume_server.batch.step_timer import StepTimer
-from relume_server.jobs.job import Job, Quota
-from relume_server.jobs.queue import JobQueue
-from relume_server.persistence.tables import ComparisonRow
 from relume_server.schemas.base import Body
 from relume_server.schemas.bodies import ComparisonFigures, ComparisonRequest
+from relume_worker.jobs.job import Job
+from relume_worker.jobs.job_kind import JobHost, JobKind
+from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.step import Step
 
 ANSWER_S = 1.5  # estimates must answer quickly
 DEFAULT_PIXEL_S = 5e-4  # of one pass on one core, before any measurement: from the built-in scenes
@@ -42,18 +40,17 @@ class DurationEstimate(NamedTuple):
     is_measured: bool
 
 
-class ComparisonQueue(JobQueue[ComparisonRequest]):
-    """Comparisons in the database, with files in `data`/comparisons/<id>/; a step is one pass."""
+class ComparisonJobs(JobKind[ComparisonRequest]):
+    """Comparisons with files in `data`/comparisons/<id>/; a step is one pass, added to the sum of earlier ones."""
 
-    row, noun, request_type = ComparisonRow, "comparison", ComparisonRequest
+    name, placeholder = "comparison", ComparisonRequest(bake="0" * 16, view="unknown", look={})
 
-    def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
+    def __init__(self, service: JobHost, data: Path) -> None:
         """
         Args:
-            sessions: of the database. data: data directory.
-            run: runs steps. quota: limits of the queue.
+            service: runs the jobs. data: data directory.
         """
-        super().__init__(sessions, data / "comparisons", run, quota)
+        super().__init__(service, data / "comparisons")
         self._pass_s: dict[_Kind, float] = {}
         self._pixel_s = DEFAULT_PIXEL_S
         self._sampler, self._sampling = ThreadPoolExecutor(1, "relume-pace"), threading.Lock()
@@ -78,7 +75,7 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
         another view is measured, from passes of other views.
 
         Args:
-            request: the comparison. num_pixels: of the image.
+            request: the comparison. num_pixels: number of pixels of the image.
         """
         key = _kind(request)
         if key not in self._pass_s:
@@ -93,7 +90,9 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
 
         def sample() -> None:
             step = Step("time of a pass", is_first=True, values={"request": request.model_dump(mode="json")})
-            self._pass_s[key] = self.run(step, lambda share: None, lambda: not self.is_closing)["seconds"]
+            self._pass_s[key] = self._service.run_step(step, lambda share: None, lambda: not self._service.is_closing)[
+                "seconds"
+            ]
 
         with self._sampling:
             if self._sample is None or self._sample.done():
@@ -103,8 +102,7 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
             pending.result(ANSWER_S)
 
     def close(self) -> None:
-        """Stop the queue, see `JobQueue`."""
-        super().close()
+        """Wait for a sample; the service is closing."""
         self._sampler.shutdown()
 
     def picture_path(self, identity: str, name: str) -> Path:
@@ -117,22 +115,22 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
 
     def figures(self, identity: str) -> Figures:
         """Errors of the frame from the passes so far."""
-        path = self.folder / identity / FIGURES
-        return Figures.model_validate_json(path.read_text()) if path.exists() else Figures.model_validate({})
+        try:
+            return Figures.model_validate_json((self.folder / identity / FIGURES).read_bytes())
+        except (FileNotFoundError, ValidationError):  # there are no passes yet, or another version wrote it
+            return Figures.model_validate({})
 
-    def step(self, job: ComparisonJob, timer: StepTimer) -> int:
-        """Render the frame if it is missing, and one pass."""
-        request = job.request
-        values: dict[str, Any] = {"request": request.model_dump(mode="json"), "folder": str(self.folder / job.id)}
-        self.record_progress(job.id, job.completed)
-        done = int(self.run_in_process(job, "frame of a comparison", values, lambda share: None)["passes"])
-        if done >= job.total:
-            return job.total
-        self.record_progress(job.id, done)
-        timer.start()
-        done = int(self.run_in_process(job, "pass of a comparison", values, timer.report)["passes"])
-        self._pass_s[_kind(request)] = timer.next_step()
-        return done
+    def run(self, run: JobRun[ComparisonRequest]) -> None:
+        """Render the frame if it is missing, and the passes one after another."""
+        job = run.job
+        values: dict[str, Any] = {"request": job.request.model_dump(mode="json"), "folder": str(run.folder)}
+        run.record(job.completed)
+        done = int(run.step("frame of a comparison", values)["passes"])
+        while done < job.total:
+            run.record(done)
+            done = int(run.timed_step(done, "pass of a comparison", values)["passes"])
+            if (pass_s := run.timer.step_s) is not None:
+                self._pass_s[_kind(job.request)] = pass_s
 
 
 def _kind(request: ComparisonRequest) -> _Kind:

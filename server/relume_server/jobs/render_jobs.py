@@ -2,55 +2,48 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from sqlalchemy.orm import Session, sessionmaker
-
+from relume.core.filesystem import UNFINISHED
 from relume.core.folder_size import folder_bytes
-from relume_server.batch.step import RunStep
-from relume_server.batch.step_timer import StepTimer
 from relume_server.io.downloads import safe_stem
-from relume_server.jobs.job import Job, Quota
-from relume_server.jobs.queue import JobQueue
-from relume_server.persistence.tables import RenderRow
-from relume_server.schemas.renders import RenderRequest
+from relume_server.schemas.renders import RENDER_PLACEHOLDER, RenderRequest
+from relume_worker.jobs.job import Job
+from relume_worker.jobs.job_kind import JobHost, JobKind
+from relume_worker.jobs.job_run import JobRun
 
 RenderJob = Job[RenderRequest]
 HEAD_BYTES = 1 << 16
 """Upper bound of an image file's size without pixels."""
+LAYER_FOLDERS = ".layers-*"
+"""Folders of `relume.output.exr.export`, next to an image that is being written."""
 
 
-class RenderQueue(JobQueue[RenderRequest]):
-    """Batches in the database, with images in `data`/renders/<id>/; a step is one image."""
+class RenderJobs(JobKind[RenderRequest]):
+    """Batches of images in `data`/renders/<id>/; a step is one image, and as many run at once as there are places."""
 
-    row, noun, request_type = RenderRow, "render", RenderRequest
+    name, placeholder = "render", RENDER_PLACEHOLDER
 
     def __init__(
         self,
-        sessions: sessionmaker[Session],
+        service: JobHost,
         data: Path,
-        run: RunStep,
-        quota: Quota,
         scene_name: Callable[[str], str],
         report_bytes: Callable[[str, int], object],
     ) -> None:
         """
         Args:
-            sessions: of the database. data: data directory.
-            run: runs steps. quota: limits of the queue. scene_name: of a bake's id.
+            service: runs the jobs. data: data directory. scene_name: of a bake's id.
             report_bytes: called with the id of a finished render, and the size of its files in bytes.
         """
-        super().__init__(sessions, data / "renders", run, quota)
+        super().__init__(service, data / "renders")
         self._scene_name, self._report_bytes = scene_name, report_bytes
 
     def steps(self, request: RenderRequest) -> int:
         """One step per frame."""
         return request.num_frames
-
-    def step_s(self, request: RenderRequest) -> float | None:
-        """None: images of different batches have little in common."""
-        return None
 
     def frame_path(self, job: RenderJob, index: int) -> Path:
         """File of one image, existing or not."""
@@ -96,37 +89,42 @@ class RenderQueue(JobQueue[RenderRequest]):
             for path in (self.frame_path(job, index), self.archive_path(job), self.video_path(job)):
                 path.unlink(missing_ok=True)
 
-        self.requeue(job, ("ready", "failed"), remove_files)
+        self.requeue(job.id, ("ready", "failed"), remove_files)
 
-    def step(self, job: RenderJob, timer: StepTimer) -> int:
-        """Render the first missing image, or pack all."""
-        missing = self.missing(job)
+    def run(self, run: JobRun[RenderRequest]) -> None:
+        """Render the missing images, and pack all."""
+        job, missing = run.job, self.missing(run.job)
         done = job.total - len(missing)
-        self.record_progress(job.id, min(done, job.total - 1))
-        if missing:
-            index = missing[0]
-            values = {"request": job.request.model_dump(mode="json"), "index": index}
-            values |= {"path": str(self.frame_path(job, index)), "scene_name": self._scene_name(job.request.bake)}
-            self.run_in_process(job, "frame of a batch", values, timer.report)
-            timer.next_step()
-            return done + 1 if len(missing) > 1 else self._pack(job)
-        return self._pack(job)
+        run.record(done)
+        _remove_unfinished(run.folder)
+        values = {"request": job.request.model_dump(mode="json"), "scene_name": self._scene_name(job.request.bake)}
+        frames = {k: {**values, "index": k, "path": str(self.frame_path(job, k))} for k in missing}
+        run.timed_steps("frame of a batch", frames, done)
+        self._pack(run)
 
-    def _pack(self, job: RenderJob) -> int:
+    def _pack(self, run: JobRun[RenderRequest]) -> None:
+        job = run.job
         frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
         video = str(self.video_path(job)) if job.request.format == "mp4" else None
         values = {"frames": frames, "archive": str(self.archive_path(job)), "video": video, "fps": job.request.fps}
-        self.run_in_process(job, "archive of a batch", values, lambda share: None)
-        self.record_progress(job.id, job.total - 1)  # the lease may be lost by now
-        self._report_bytes(job.id, folder_bytes(self.folder / job.id))
-        return job.total
+        run.step("archive of a batch", values)
+        run.record(job.total)  # the lease may be lost by now
+        self._report_bytes(job.id, folder_bytes(run.folder))
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove files of killed processes from the folder of a batch, none of whose images is being rendered."""
+    for stray in folder.glob(LAYER_FOLDERS):
+        shutil.rmtree(stray, ignore_errors=True)
+    for unfinished in folder.glob(UNFINISHED):
+        unfinished.unlink(missing_ok=True)
 
 
 def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int) -> int:
     """Upper bound of the size of a render's files: uncompressed images, and all of them again in the archive.
 
     Args:
-        request: the batch. size: of an image, pixels. num_layers: per image, including the image itself.
+        request: the batch. size: size of an image, pixels. num_layers: per image, including the image itself.
     """
     channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
     picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers

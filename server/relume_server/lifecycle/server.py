@@ -22,7 +22,7 @@ class ServerProcess(uvicorn.Server):
     """Runs the app until it is stopped: by SIGTERM after its sessions have left, by SIGINT or a second SIGTERM at once.
 
     Args:
-        config: of uvicorn. drain: state for sessions and /readyz. num_sessions: open ones.
+        config: config of uvicorn. drain: state for sessions and /readyz. num_sessions: number of open sessions.
         drain_seconds: time limit for sessions to leave. stop_seconds: time limit for everything else afterwards.
         on_started: called once requests are answered. end: ends this process unconditionally.
     """

@@ -14,8 +14,8 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.core.errors import NotFoundError, ParameterError
-from relume_server.errors import BusyError
 from relume_server.persistence.tables import CommentRow
+from relume_worker.jobs.job import BusyError
 
 MAX_COMMENTS, MAX_PER_SCENE, MAX_BYTES = 10_000, 500, 256 * 1024**2
 
@@ -71,7 +71,7 @@ class CommentStore:
         """Add a comment.
 
         Args:
-            scene: id. pin: position, as JSON. text: checked. author: name. picture: snapshot, WebP.
+            scene: id. pin: position, as JSON. text: validated. author: display name. picture: snapshot, WebP.
         Raises:
             BusyError: the limit is reached.
         """
@@ -105,7 +105,7 @@ class CommentStore:
         with self._sessions() as session:
             picture = _row(session, scene, comment).picture
         if picture is None:
-            raise NotFoundError("this comment has no snapshot")
+            raise NotFoundError("this comment has no snapshot; view the pixel of its pin instead")
         return picture
 
     def delete(self, scene: str, comment: str) -> None:

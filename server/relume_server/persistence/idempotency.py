@@ -51,7 +51,7 @@ class IdempotencyStore:
         """Claim a key for a call, or return the earlier call.
 
         Args:
-            client: caller. key: of the caller. digest: of the whole request.
+            client: name of the caller. key: the caller's key. digest: digest of the whole request.
         """
         self._tidy(client)
         while True:

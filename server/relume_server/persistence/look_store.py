@@ -14,10 +14,11 @@ from sqlalchemy import CursorResult, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.core.errors import NotFoundError, ParameterError, bytes_text
+from relume.core.errors import Description, NotFoundError, ParameterError, bytes_text
 from relume.look import Look
-from relume_server.errors import BusyError, PreconditionFailedError, PreconditionRequiredError, TooLargeError
+from relume_server.errors import PreconditionFailedError, PreconditionRequiredError, TooLargeError
 from relume_server.persistence.tables import LookRow
+from relume_worker.jobs.job import BusyError
 
 MAX_LOOK_BYTES = 256 * 1024
 MAX_LOOKS = 10_000
@@ -79,12 +80,12 @@ def parse_document(body: bytes) -> str:
         document: Any = json.loads(body, parse_constant=_refuse_constant)
         text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
-        raise ParameterError("look", "not JSON", "a look document as JSON with finite numbers") from None
+        raise ParameterError("look", Description("not JSON with finite numbers"), "a look document") from None
     if not isinstance(document, dict):
         raise ParameterError("look", document, "an object with some of " + ", ".join(SECTIONS))
     for section, value in document.items():
         if section not in SECTIONS:
-            raise ParameterError(f"/{section[:80]}", value, "a known name: a look has " + ", ".join(SECTIONS))
+            raise ParameterError(f"/{section[:80]}", value, "one of the sections of a look: " + ", ".join(SECTIONS))
         if not isinstance(value, dict):
             raise ParameterError(f"/{section}", value, "an object")
     return text
@@ -135,7 +136,7 @@ class LookStore:
         """Save a look; return it, and true if it is new.
 
         Args:
-            name, document: checked. if_match, if_none_match: the headers.
+            name, document: validated. if_match, if_none_match: the headers.
             created: time of a new look, for example of a renamed one; None: now.
         Raises:
             ParameterError: `created` is in the future, or before 1970.
@@ -162,7 +163,7 @@ class LookStore:
         with self._sessions() as session:
             row = session.get(LookRow, name)
             if row is None or row.thumbnail is None or row.thumbnail_of != row.etag:
-                raise NotFoundError(f"there is no thumbnail of look {name!r}")
+                raise NotFoundError(f"there is no thumbnail of look {name!r}; send one first")
             return row.thumbnail
 
     def put_thumbnail(self, name: str, picture: bytes, if_match: str | None) -> None:

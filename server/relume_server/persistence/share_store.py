@@ -18,9 +18,10 @@ from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.core.errors import NotFoundError, ParameterError, bytes_text
-from relume_server.errors import BusyError, TooLargeError
+from relume.core.errors import Description, NotFoundError, ParameterError, bytes_text
+from relume_server.errors import TooLargeError
 from relume_server.persistence.tables import ShareRow
+from relume_worker.jobs.job import BusyError
 
 MAX_SHARE_BYTES = 256 * 1024
 MAX_SHARES, MAX_BYTES = 10_000, 256 * 1024**2
@@ -119,7 +120,7 @@ def _as_json(document: Mapping[str, Any]) -> str:
     try:
         text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
-        raise ParameterError("/look", "not a number", "a look with finite numbers") from None
+        raise ParameterError("/look", Description("not JSON with finite numbers"), "a look document") from None
     if len(text.encode()) > MAX_SHARE_BYTES:
         raise TooLargeError(f"a shared look has at most {bytes_text(MAX_SHARE_BYTES)}; simplify its curves")
     return text

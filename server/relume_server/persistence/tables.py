@@ -38,53 +38,11 @@ class ShareRow(Base):
     created: Mapped[float]
 
 
-class JobRow(Base):
-    """A job, see `relume_server.jobs.queue`. `request` is the body as JSON.
-
-    `client` submitted it, and `is_first` gives it priority; null in rows of older versions. The process of its current
-    step has the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the database's clock). `started` and
-    `ended` are seconds since 1970; None: not yet, or in a row of an older version.
-    """
-
-    __abstract__ = True
-
-    id: Mapped[str] = mapped_column(primary_key=True)
-    request: Mapped[str] = mapped_column(Text)
-    state: Mapped[str] = mapped_column(index=True)
-    done: Mapped[int]
-    problem: Mapped[str | None] = mapped_column(Text)
-    created: Mapped[float]
-    client: Mapped[str | None]
-    is_first: Mapped[bool | None]
-    owner: Mapped[str | None] = mapped_column(default=None)
-    heartbeat: Mapped[float | None] = mapped_column(default=None)
-    started: Mapped[float | None] = mapped_column(default=None)
-    ended: Mapped[float | None] = mapped_column(default=None)
-
-
-class RenderRow(JobRow):
-    """A batch of renders; `done` frames are finished."""
-
-    __tablename__ = "renders"
-
-
-class BtfRow(JobRow):
-    """A BTF to make or import, in one step."""
-
-    __tablename__ = "btfs"
-
-
-class ComparisonRow(JobRow):
-    """A comparison with the reference; `done` passes are finished."""
-
-    __tablename__ = "truths"
-
-
 class RoomRow(Base):
     """Lease of rooms, see `relume_server.persistence.leases`; deleted when they are empty.
 
     Attributes:
-        prefix: of their ids. owner, heartbeat: as for the lease of a job.
+        prefix: prefix of their ids. owner, heartbeat: as for the lease of a job.
     """
 
     __tablename__ = "rooms"
@@ -98,7 +56,7 @@ class CommentRow(Base):
     """A comment, see `relume_server.persistence.comment_store`.
 
     Attributes:
-        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: of all of it.
+        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: total size in bytes.
         created, resolved: seconds since 1970; None: open.
     """
 
@@ -121,9 +79,10 @@ class IdempotencyRow(Base):
     """A call with an idempotency key and its response, see `relume_server.persistence.idempotency`.
 
     Attributes:
-        client, key: caller, and the caller's key. digest: of the whole request.
+        client, key: caller, and the caller's key. digest: digest of the whole request.
         owner: the process that runs it; see `relume_worker.lease`. created: seconds since 1970 by the database's clock.
-        status: of the response; None: not yet. location, media_type, body: of the response.
+        status: status of the response; None: not yet.
+        location, media_type, body: location, media type and body of the response.
     """
 
     __tablename__ = "idempotency"

@@ -37,7 +37,7 @@ class TransferPool:
     ) -> None:
         """
         Args:
-            open_transfer: opens a store. executor: for opening.
+            open_transfer: opens a store. executor: executor for opening.
             idle_s: time for which an unused bake stays open. clock: monotonic seconds.
         """
         self._open_transfer, self._executor = open_transfer, executor

@@ -20,9 +20,9 @@ class CacheEvictor:
     """Runs every few seconds while the server runs.
 
     Args:
-        transfers: open bakes. threads: for the work.
+        transfers: open bakes. threads: threads for the work.
         trim_cache: evicts the results of all other stores, down to the floor.
-        used_bytes: size of the caches. release_processes: ends idle processes.
+        used_bytes: size of the caches.
     """
 
     def __init__(
@@ -31,9 +31,7 @@ class CacheEvictor:
         threads: Threads,
         trim_cache: Callable[[Collection[Path]], None],
         used_bytes: Callable[[], int],
-        release_processes: Callable[[], None],
     ) -> None:
-        self._release_processes = release_processes
         self._transfers, self._threads, self._trim_cache = transfers, threads, trim_cache
         self._used_bytes = used_bytes
 
@@ -51,6 +49,5 @@ class CacheEvictor:
         before = self._used_bytes()
         num_closed, used_stores = self._transfers.release()
         self._trim_cache(used_stores)
-        await asyncio.to_thread(self._release_processes)
         if num_closed or self._used_bytes() < before:
             await asyncio.get_running_loop().run_in_executor(self._threads.long, trim_heap)

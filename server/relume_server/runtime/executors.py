@@ -21,8 +21,8 @@ class Threads:
     """Thread pools of the app.
 
     Attributes:
-        queries: for short database queries that must not wait: room leases, events.
-        short_slots: of sessions in the pool for short steps, first come, first served.
+        queries: threads for short database queries that must not wait: room leases, events.
+        short_slots: number of sessions in the pool for short steps, first come, first served.
     """
 
     def __init__(self) -> None:

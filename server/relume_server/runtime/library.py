@@ -26,9 +26,9 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.live.fixed_camera.protocols import CameraMode
     from relume.live.free_camera.browser.geometry_arrays import array_factories, constants
     from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-    from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
-    from relume.methods.registry import open_bake
-    from relume.methods.static_view import StaticViewBuilder
+    from relume.live.free_camera.progressive_picture import ProgressivePicture
+    from relume.live.opened.openers import open_bake
+    from relume.live.opened.static_view import StaticViewBuilder
     from relume.output.render_image import render_image, render_small
     from relume.output.viewport import Viewport
     from relume.reference import render_reference

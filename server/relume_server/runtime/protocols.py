@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.cache import CacheOwner
-from relume.live.fixed_camera.fidelity import FidelityLabel
 from relume.live.fixed_camera.protocols import OpenBake
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
     from relume.reference import ReferenceImage
     from relume.scene.model import Camera
@@ -24,38 +24,12 @@ Tile = tuple[int, int, int, int]
 F32 = NDArray[np.float32]
 
 
-class Progress(Protocol):
-    """Result of one step."""
-
-    @property
-    def tiles(self) -> Sequence[Tile]: ...
-    @property
-    def exact(self) -> bool: ...
-    @property
-    def fidelity(self) -> FidelityLabel:
-        """Fidelity of the visible region."""
-        ...
-
-    @property
-    def complete(self) -> bool:
-        """True if every term is shown."""
-        ...
-
-    @property
-    def changed(self) -> bool: ...
-    @property
-    def previous_error(self) -> float | None:
-        """Error of the approximate image that an exact one replaces, relative RMS, after the camera stopped."""
-        ...
-
-
 class Picture(Protocol):
     """A live image; used from one thread at a time."""
 
     def set_look(self, look: Any, *, active_pointer: str | None, solo: frozenset[str] | None) -> None: ...
     def check(self, look: Any) -> None: ...
     def next_job(self) -> Job | None: ...
-    def install(self, job: Any, result: Any) -> None: ...
     def prepare(self, pointer: str) -> None: ...
     def advance(self, max_coefficients: int | None) -> Progress: ...
     def all_tiles(self) -> Sequence[Tile]: ...

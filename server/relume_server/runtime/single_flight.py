@@ -14,7 +14,7 @@ class SingleFlight:
     """Runs each work once for all waiters; nothing is cached. Event loop only.
 
     Args:
-        num_threads: maximum number. name: of the threads.
+        num_threads: maximum number of threads. name: name of the threads.
     """
 
     def __init__(self, num_threads: int, name: str) -> None:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
-from relume.live.fixed_camera.fidelity import FidelityLabel
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.validate import MAX_LIGHTS
 from relume_server.schemas.connection import DrainMessage, OpenMessage, PingMessage, PongMessage
@@ -394,7 +394,7 @@ class FrameHeader(Message):
     tiles: list[tuple[int, int, int, int]]
     format: Literal["rgb9e5", "jpeg", "f32", "r8", "arrays"]
     exact: bool
-    fidelity: FidelityLabel
+    fidelity: Fidelity
     complete: bool
     kind: Literal["picture", "highlight", "scene_update"]
     alpha: bool = False

@@ -129,6 +129,10 @@ class RenderRequest(Animation):
         return "png" if self.format == "mp4" else self.format
 
 
+RENDER_PLACEHOLDER = RenderRequest(bake="0" * 16, view="unknown", looks=[{}], format="png")
+"""Stands for requests in the database that cannot be read."""
+
+
 class RenderBody(Body):
     """A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one.
 

@@ -20,7 +20,7 @@ class AuditWriter:
     """Counts edits and the pointers that they change. Event loop only.
 
     Args:
-        audit: to write to. caller: of the session. session_name: in the audit.
+        audit: audit to write to. caller: caller of the session. session_name: session name in the audit.
     """
 
     def __init__(self, audit: Audit, caller: Caller, session_name: str) -> None:

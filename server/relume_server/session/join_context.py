@@ -15,7 +15,7 @@ class JoinContext:
 
     Attributes:
         resume: token of a lost session. look: complete document to start with; None: the scene's default.
-        join_request: of the room to join; None: no room.
+        join_request: join request of the room to join; None: no room.
     """
 
     caller: Caller

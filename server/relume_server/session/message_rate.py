@@ -19,7 +19,7 @@ CPU_FRACTION, WORK_BURST_S = 0.15, 0.3
 _MIN_SLEEP_S = 0.001
 
 
-class Pace:
+class MessageRateLimit:
     """Token buckets for messages, and for the time to process them. Event loop only.
 
     Args:

@@ -28,7 +28,7 @@ async def read_opening(websocket: WebSocket) -> OpenMessage:
         async with asyncio.timeout(OPEN_SECONDS):
             message = read_message(await websocket.receive())
     except TimeoutError:
-        raise ProtocolError(f"no message within {OPEN_SECONDS:g} s; send open first", CLOSE_POLICY) from None
+        raise ProtocolError(f"no message arrived within {OPEN_SECONDS:g} s; send open first", CLOSE_POLICY) from None
     if isinstance(message, protocol.Problem):
         raise ProtocolError(message.detail, CLOSE_POLICY)
     if not isinstance(message, OpenMessage):

@@ -20,7 +20,7 @@ from relume_server.errors import CLOSE_POLICY
 from relume_server.schemas import protocol
 from relume_server.schemas.connection import OpenMessage, PingMessage, PongMessage
 from relume_server.schemas.rooms import PresenceMessage
-from relume_server.session.message_rate import Pace
+from relume_server.session.message_rate import MessageRateLimit
 from relume_server.session.reader import read_message
 from relume_server.session.session_state import SessionState
 
@@ -49,14 +49,14 @@ class MessageReceiver:
             WebSocketDisconnect: the client is gone.
             ProtocolError: the session must end; carries the close code.
         """
-        pace = Pace()
+        rate_limit = MessageRateLimit()
         while True:
             received = await self._websocket.receive()
             received_s = time.perf_counter()
             num_in_flight = self._window.num_in_flight
-            pace.start_message()
+            rate_limit.start_message()
             await self._answer(received, received_s)
-            await pace.pause(is_due=self._window.num_in_flight < num_in_flight)
+            await rate_limit.pause(is_due=self._window.num_in_flight < num_in_flight)
 
     async def _answer(self, received: Any, received_s: float) -> None:
         """Handle a message, or answer with a problem."""
@@ -79,7 +79,7 @@ class MessageReceiver:
         """Answer an invalid message; a limited number is tolerated."""
         self._num_bad += 1
         if self._num_bad > MAX_BAD_MESSAGES:
-            raise ProtocolError("too many invalid messages; reload the page", CLOSE_POLICY)
+            raise ProtocolError("this session sent too many invalid messages; reload the page", CLOSE_POLICY)
         await self._socket.refuse(problem)
 
     def _dispatch(self, message: protocol.ClientMessage, received_s: float) -> None:
@@ -148,7 +148,7 @@ class MessageReceiver:
     def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
         """Store a new camera; a `seq` that is not newer than the last is ignored."""
         if self._transfer.camera_mode is not CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view with a free camera; bake the scene with method probes")
+            raise ParameterError("view", message.view, "a view with a free camera, or bake with method probes")
         self._check_view(message.view)
         width, height = message.size
         if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_CAMERA_PIXELS):

@@ -44,7 +44,7 @@ from relume_worker.database.failures import DATABASE_ERRORS, describe_error
 
 if TYPE_CHECKING:
     from relume.live.free_camera.free_view import FreeView
-    from relume.methods.free_camera_transfer import BakedFreeCamera
+    from relume.live.opened.free_camera_transfer import BakedFreeCamera
 
 log = logging.getLogger(__name__)
 

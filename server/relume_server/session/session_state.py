@@ -22,8 +22,8 @@ class SessionState:
     """Written by the receiver, read by the frame loop; all on the event loop.
 
     Attributes:
-        traces: None if disabled. caller: the client. member: of the room; None without a room. audit_writer: None for
-            view-only clients, which change view settings only.
+        traces: None if disabled. caller: the client. member: member of the room; None without a room.
+        audit_writer: None for view-only clients, which change view settings only.
     """
 
     socket: ClientSocket

@@ -62,7 +62,7 @@ class Traces:
         """Record a frame that answers an edit.
 
         Args:
-            name: "edit" or "camera". times: of the frame. attributes: without the common prefix.
+            name: "edit" or "camera". times: times of the frame. attributes: attributes without the common prefix.
         """
         from opentelemetry.trace import set_span_in_context
 

@@ -23,9 +23,9 @@ from relume_cli.main import main
 from relume_server.app import create_app
 from relume_server.client_state.look_state import LookState
 from relume_server.client_state.visible_views import VisibleViews
-from relume_server.persistence.tables import RenderRow
 from relume_server.schemas.renders import RenderRequest
 from relume_server.settings import Settings
+from relume_worker.database.models import JobRow
 from relume_worker.lease import new_owner
 
 
@@ -208,7 +208,7 @@ def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys)
         of_another = {"owner": new_owner(), "heartbeat": time.time()}  # another server is working on it
         row = {"id": "f" * 16, "request": request, "state": "running", "done": 0, "created": 0.0, "client": ""}
         with client.app.state.services.bakes.ledger.sessions.begin() as rows:
-            rows.add(RenderRow(**row, is_first=False, **of_another))
+            rows.add(JobRow(kind="render", **row, is_first=False, **of_another))
         rejected = client.delete(f"/api/materials/btf/{listed['id']}")
         assert (rejected.status_code, "by render ffff" in rejected.json()["detail"]) == (409, True)
         client.delete(f"/api/renders/{row['id']}")

@@ -4,22 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from session_edits import relative_rmse, run_next_job, run_until_exact
+from session_edits import kind_of, relative_rmse, run_next_job, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
-from relume.live.fixed_camera.jobs import Shade
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
-from relume.live.fixed_camera.strategies.texel_sum import SumTexels
+from relume.live.opened.openers import open_bake
 from relume.look import validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.transport.texture_light import rotated_tables, texture_light_rows
 
 GRAY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
@@ -80,7 +78,7 @@ def test_a_rotated_texture_is_followed_and_then_exact(bake, small_btf, active_pi
 
 def test_light_missing_from_the_cache_gives_a_preview_that_is_not_exact(bake, small_btf, monkeypatch):
     """As in a look that was opened with images from disk."""
-    monkeypatch.setattr("relume.live.fixed_camera.texel_light_cache._BUDGET_DIVISOR", 1 << 20)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.texel_sum._BUDGET_DIVISOR", 1 << 20)
     picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
     before = run_until_exact(picture).image()
@@ -88,11 +86,11 @@ def test_light_missing_from_the_cache_gives_a_preview_that_is_not_exact(bake, sm
     picture.set_look(look)
     assert picture.advance(None).fidelity == "approximate"
     np.testing.assert_array_equal(picture.image(), before)
-    assert isinstance(run_next_job(picture), SparsePreview)
+    assert kind_of(run_next_job(picture)) == "preview"
     assert picture.advance(None).fidelity == "preview"
     expected = render_image(bake, "front", look)
     assert relative_rmse(picture.image(), expected) < 0.2 * relative_rmse(before, expected)
-    assert isinstance(picture.next_job(), Shade)
+    assert kind_of(picture.next_job()) == "image"
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
 
 
@@ -102,7 +100,7 @@ def test_frames_do_not_wait_for_many_texels(bake, small_btf, active_picture, mon
     look = covered(bake, small_btf.record, scale=2.9)
     active_picture.set_look(look)
     assert active_picture.advance(None).fidelity == "approximate"
-    assert isinstance(run_next_job(active_picture), SparsePreview)
+    assert kind_of(run_next_job(active_picture)) == "preview"
     assert active_picture.advance(None).fidelity == "preview"
     assert relative_rmse(run_until_exact(active_picture).image(), render_image(bake, "front", look)) < 1e-6
 
@@ -114,7 +112,7 @@ def test_preparing_an_edit_caches_the_light(bake, small_btf, active_picture):
     run_until_exact(active_picture)
     active_picture._images.cache.trim(0, ())
     active_picture.prepare("/materials/Floor/terms/0/params/scale")
-    assert isinstance(run_next_job(active_picture), SumTexels)
+    assert kind_of(run_next_job(active_picture)) == "texel light"
     assert active_picture.next_job() is None
     active_picture.set_look(covered(bake, small_btf.record, scale=3.0, environment=30.0))
     assert active_picture.advance(None).exact
@@ -130,7 +128,7 @@ def test_other_fixed_parameters_are_previewed(bake):
     before = run_until_exact(picture).image()
     picture.set_look(look(1.0))
     assert picture.advance(None).fidelity == "approximate"
-    assert isinstance(run_next_job(picture), SparsePreview)
+    assert kind_of(run_next_job(picture)) == "preview"
     picture.advance(None)
     expected = render_image(bake, "front", look(1.0))
     assert relative_rmse(picture.image(), expected) < 0.3 * relative_rmse(before, expected)

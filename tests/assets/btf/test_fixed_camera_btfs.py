@@ -15,16 +15,17 @@ from relume.brdf.terms.btf import BtfRef
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_bake
 from relume.look import validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.reference import ReferencePoints, reference_image
 from relume.reference.lobes import cosine_lobe
 from relume.reference.path_tracing import _sample_btf_surfaces, _sample_directions
 from relume.reference.roughness_classes import RoughnessClasses
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.transport.btf_kernel import _MAX_FOOTPRINT_SAMPLES, _MAX_SPACING, F64, texel_rows
 
 CAMERA = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
@@ -219,7 +220,7 @@ def test_other_methods_show_btfs_and_follow_edits(small_btf, tmp_path, method):
         look = covered(bake, small_btf.record, (red, 1, 1), scale=3.0)
         live.set_look(look, active_pointer="/materials/Floor/terms/0/color")
         while (job := live.next_job()) is not None:
-            live.install(job, job.run(lambda fraction: None, lambda: False))
+            job.apply(job.run(lambda fraction: None, lambda: False))
         live.advance(None)
         live.set_look(look)
         run_until_exact(live)

@@ -11,7 +11,6 @@ from relume.assets.btf.btf_store import load_btf
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
 from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
-from relume.live.free_camera.probes.lattice_nodes import LatticeNodes
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
@@ -23,8 +22,9 @@ from relume.live.free_camera.texel_brdf.texel_tables import (
 )
 from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight
 from relume.look import validate
-from relume.math.zernike import project, recurrence
+from relume.math.zernike import basis_functions, recurrence
 from relume.output.render_image import render_image
+from relume.probes.lattice_nodes import LatticeNodes
 
 SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
 TO_LIGHT = np.array([0.5, 0.8, 0.2]) / np.linalg.norm([0.5, 0.8, 0.2])
@@ -74,7 +74,7 @@ def vectors_of(surface, to_light):
     """Incident radiance coefficients of all probes for light from one direction, in the frame of each probe."""
     n, t = (getattr(surface.probes, name).astype(np.float64) for name in ("normal", "tangent"))
     local = np.stack([t @ to_light, np.cross(n, t) @ to_light, n @ to_light], axis=1)
-    return np.repeat(project(local)[:, None], 3, axis=1).astype(np.float32)
+    return np.repeat(basis_functions(local)[:, None], 3, axis=1).astype(np.float32)
 
 
 def terms_of(look_of):
@@ -105,7 +105,7 @@ def shade_ray_numpy(cover, d, position):
         fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
         number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
         numbers += fraction * tables.step * tables.weight[:, number].astype(float)
-    light = pack_lanes(project(axes @ TO_LIGHT))
+    light = pack_lanes(basis_functions(axes @ TO_LIGHT))
     view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, -(axes @ d)[None])
 
     return np.einsum("a,ack,k->c", of_view[0], factors(numbers, tables.axes)[view[0]], light)

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from session_edits import kind_of
 from test_fixed_camera_btfs import CAMERA, GRAY, SIZE
 from tiny_scenes import make_tiny_scene, quad, studio
 
@@ -17,13 +18,14 @@ from relume.core import cache as memories
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.progressive_picture import ProgressivePicture
 from relume.live.free_camera.texel_brdf import texel_tables
-from relume.live.free_camera.texel_brdf.job import TablesJob
+from relume.live.opened.openers import open_bake
 from relume.look import validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 NUM = 5
 NAMES = [f"Strip {k}" for k in range(NUM)]
@@ -74,7 +76,7 @@ def run_to_the_end(picture):
         picture.advance(None)
         if (job := picture.next_job()) is None:
             return picture
-        picture.install(job, job.run(lambda fraction: None, lambda: False))
+        job.apply(job.run(lambda fraction: None, lambda: False))
     raise AssertionError("it never rests")
 
 
@@ -118,8 +120,8 @@ def test_frames_show_the_mean_until_the_tables_are_ready(opened, records, monkey
         during.setattr(texel_tables, "compute_texel_tables", lambda whole: pytest.fail("made by a frame"))
         picture.advance(None)
         mean = picture.image()
-        while not isinstance(job := picture.next_job(), TablesJob):
-            picture.install(job, job.run(lambda fraction: None, lambda: False))
+        while kind_of(job := picture.next_job()) != "BTF tables":
+            job.apply(job.run(lambda fraction: None, lambda: False))
             picture.advance(None)
             mean = picture.image()
     image = run_to_the_end(picture).image()
@@ -129,6 +131,18 @@ def test_frames_show_the_mean_until_the_tables_are_ready(opened, records, monkey
     expected = alone.image()
     size = np.linalg.norm(expected)
     assert np.linalg.norm(image - expected) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - expected)
+
+
+@pytest.mark.parametrize("opened", ["probes"], indirect=True)
+def test_a_moving_camera_computes_tables_once(opened, records):
+    picture = ProgressivePicture(FreeCameraPicture(opened, "front", is_watched=True), refuse_static_view, opened.cache)
+    picture.set_look(look_of(opened, records))
+    picture.set_camera(opened.views["front"].camera, (32, 24), is_idle=False)
+    run_to_the_end(picture)
+
+
+def refuse_static_view(*args, **kwargs):
+    pytest.fail("the camera moves")
 
 
 @pytest.mark.parametrize("opened", ["probes"], indirect=True)

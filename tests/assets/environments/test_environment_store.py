@@ -9,9 +9,9 @@ import pytest
 from environment_files import dusk, write_map
 from PIL import Image
 
-from relume.assets import environments
 from relume.assets.environments import environment_store
 from relume.assets.environments.built_in import BUILT_IN, load_built_in
+from relume.assets.environments.environment_names import environment_exists, environment_names, load_environment
 from relume.assets.environments.environment_store import STORE, get_record, records, store_environment, thumbnail_path
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.assets.environments.thumbnail import thumbnail
@@ -23,12 +23,12 @@ from relume_server.io.import_request import remove_strays
 def test_an_import_is_listed_and_found_by_its_name(library):
     (record,) = records(library)
     assert (record.name, record.map, record.warnings) == ("Dusk", f"env:{record.id}", ())
-    environment = environments.load_environment(record.map)
+    environment = load_environment(record.map)
     assert environment.name == "Dusk"
     np.testing.assert_array_equal(environment.radiance, dusk())
     assert not environment.radiance.flags.writeable
-    assert environments.environment_exists(record.map)
-    assert environments.environment_names() == [*BUILT_IN, record.map]
+    assert environment_exists(record.map)
+    assert environment_names() == [*BUILT_IN, record.map]
     with Image.open(thumbnail_path(library, record.id)) as picture:
         assert (picture.size, picture.mode) == ((192, 96), "RGB")
 
@@ -67,15 +67,15 @@ def test_large_maps_are_downsampled_and_keep_their_brightness(tmp_path, monkeypa
     with STORE.with_search_folder(tmp_path / "library") as folder:
         record = store_environment(folder, path, "Large")
         assert record.warnings == ("HDRI “Large” was scaled from 96×48 to 32×16.",)
-        radiance = environments.load_environment(record.map).radiance
+        radiance = load_environment(record.map).radiance
     np.testing.assert_allclose(radiance, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", ["", "env:", "env:../../etc", "env:0123456789abcdef", "Studio", "0123456789abcdef"])
 def test_other_names_are_unknown(library, name):
-    assert not environments.environment_exists(name)
+    assert not environment_exists(name)
     with pytest.raises(NotFoundError, match="import its file again"):
-        environments.load_environment(name)
+        load_environment(name)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_errors_name_damaged_environment_files(library, tmp_path, file, content)
     shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / file).write_bytes(content)
     with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="import it again"):
-        environments.load_environment("env:fedcba9876543210")
+        load_environment("env:fedcba9876543210")
 
 
 def test_arrays_of_other_shapes_are_damage(library, tmp_path):
@@ -99,7 +99,7 @@ def test_arrays_of_other_shapes_are_damage(library, tmp_path):
     for shape in ((4, 4, 3), (4, 8), (4, 8, 4), (0, 0, 3)):
         np.save(tmp_path / "fedcba9876543210" / "radiance.npy", np.ones(shape, np.float32))
         with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="damaged"):
-            environments.load_environment("env:fedcba9876543210")
+            load_environment("env:fedcba9876543210")
 
 
 def test_a_record_without_warnings_is_damage(library, tmp_path):

@@ -134,9 +134,9 @@ def test_maps_wider_than_requested_are_downsampled_with_a_warning(tmp_path: Path
         environment = read_environment(path, "sky", width)
         assert environment.radiance.mean() == pytest.approx(repaired.mean(), rel=5e-3)
         assert environment.warnings == (
-            "2 NaN or infinite texels of HDRI “sky” were made black.",
-            "3 negative texels of HDRI “sky” were set to 0.",
-            f"HDRI “sky” was scaled from 384×192 to {said}.",
+            "2 NaN or infinite texels of environment “sky” were made black.",
+            "3 negative texels of environment “sky” were set to 0.",
+            f"Environment “sky” was scaled from 384×192 to {said}.",
         )
     quarter = read_environment(path, "sky", 96).radiance
     np.testing.assert_allclose(quarter, repaired.reshape(48, 4, 96, 4, 3).mean(axis=(1, 3)), rtol=1e-5)

@@ -144,5 +144,5 @@ def test_a_look_accepts_only_known_measured_data(data):
             complete_term(("terms", 0), {"model": "measured_hd", "data": bad}, None)
     with pytest.raises(ParameterError, match="imported here"):
         complete_term(("terms", 0), {"model": "measured_lv"}, None)
-    with pytest.raises(ParameterError, match="'lambert' has no data"):
+    with pytest.raises(ParameterError, match="give no data, because 'lambert' has none"):
         complete_term(("terms", 0), {"model": "lambert", "data": data}, None)

@@ -16,13 +16,13 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import default_look, validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.reference import reference_image
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_server.client_state.pointers import find_curve
 
 LOBES, HOMOMORPHIC = ("measured_lv", "measured_hd"), ("measured_hf",)

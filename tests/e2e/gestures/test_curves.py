@@ -17,7 +17,7 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 
 HALF_ANGLE = "half angle θh"
 NUDGE = 1e-3

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from environment_files import dusk, write_map
 from exact_pictures import exact_image
-from session_edits import BUDGET, make_look, relative_rmse, run_next_job, run_until_exact
+from session_edits import BUDGET, kind_of, make_look, relative_rmse, run_next_job, run_until_exact
 
 from relume.assets.environments.environment_store import STORE, store_environment
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.views.view import View
 
@@ -74,7 +73,7 @@ def test_a_new_environment_appears_everywhere_at_once(opened, maps):
     still = picture.advance(None)
     assert (still.tiles, still.exact, still.fidelity, still.complete) == ([], False, "approximate", True)
     np.testing.assert_array_equal(picture.image(), before)
-    assert isinstance(run_next_job(picture), SparsePreview)
+    assert kind_of(run_next_job(picture)) == "preview"
     come = picture.advance(None)
     assert (come.fidelity, come.complete) == ("preview", True)
     assert colors_of(picture) == [2]
@@ -92,7 +91,7 @@ def test_without_memory_for_a_preview_the_old_picture_stays(transfer, maps):
     picture.set_look(make_look(transfer, lit_by(maps, 1)))
     while not picture.advance(None).exact:
         np.testing.assert_array_equal(picture.image(), before)
-        assert not isinstance(run_next_job(picture), SparsePreview)
+        assert kind_of(run_next_job(picture)) != "preview"
     assert colors_of(picture) == [1]
 
 
@@ -146,7 +145,7 @@ def test_continuous_edits_never_mix_two_lights(opened, maps, seed):
             if rng.random() < 0.4:  # the edit continues meanwhile
                 looks.append(any_look())
                 picture.set_look(looks[-1])
-            picture.install(need, made)
+            need.apply(made)
         advance = picture.advance(8)
         assert advance.complete
         assert len(colors_of(picture)) == 1, "a picture of two lights"
@@ -163,10 +162,10 @@ def test_an_opened_picture_is_complete_at_once_and_then_shaded(opened, maps, mon
     picture = start(opened, look, is_watched=True)
     nothing = picture.advance(None)
     assert (nothing.complete, nothing.fidelity) == (False, "preview")
-    assert isinstance(run_next_job(picture), SparsePreview)
+    assert kind_of(run_next_job(picture)) == "preview"
     whole = picture.advance(None)
     assert (whole.complete, whole.fidelity, whole.exact) == (True, "preview", False)
-    while isinstance(picture.next_job(), SparsePreview):
+    while kind_of(picture.next_job()) == "preview":
         run_next_job(picture)
     expected = exact_image(opened, look)
     picture.advance(None)
@@ -190,12 +189,12 @@ def test_direct_light_is_shown_before_indirect_light(gathered, maps, monkeypatch
     first, of_direct = (start(gathered, look, is_watched=True) for look in reversed(looks))
     for picture in (first, of_direct):
         picture.advance(None)
-        assert isinstance(run_next_job(picture), SparsePreview)
+        assert kind_of(run_next_job(picture)) == "preview"
         assert picture.advance(None).complete
     assert not read
     before = first.image()
     np.testing.assert_array_equal(before, of_direct.image())
-    assert isinstance(run_next_job(first), SparsePreview)
+    assert kind_of(run_next_job(first)) == "preview"
     first.advance(None)
     assert read
     assert relative_rmse(first.image() - before, all_light - direct) < 0.4
@@ -214,7 +213,7 @@ def test_a_picture_with_stored_images_opens_without_a_preview(transfer, maps, mo
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     look = make_look(transfer, lit_by(maps, 2))
     run_until_exact(start(transfer, look))
-    assert not isinstance(start(transfer, look, is_watched=True).next_job(), SparsePreview)
+    assert kind_of(start(transfer, look, is_watched=True).next_job()) != "preview"
 
 
 def test_emission_is_updated_only_when_light_changes(transfer, maps, monkeypatch):

@@ -11,13 +11,14 @@ from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 from relume.core.cache import Cache
 from relume.core.color import luminance
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.reference import reference_image
 from relume.scene.emission import normalize_emission
 from relume.scene.model import Light, Material, Texture, TextureEncoding
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = 40, 30
 

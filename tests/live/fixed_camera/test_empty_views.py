@@ -10,9 +10,10 @@ from tiny_scenes import make_camera, make_tiny_scene, sphere
 
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
-from relume.methods.registry import METHODS, open_transfer
-from relume.store import bake_in_process
+from relume.live.opened.openers import open_transfer
+from relume.methods.registry import METHODS
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 
 def test_no_light_is_black(transfer):

@@ -29,7 +29,7 @@ from relume.core.cache import Cache
 from relume.core.color import srgb_encode
 from relume.image_io.write_image import to_bytes
 from relume.lights.prefilter import downsampled, prefiltered
-from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO, Background
+from relume.live.fixed_camera.background import MAX_CATCHER_RATIO, Background
 from relume.live.fixed_camera.picture import Picture
 from relume.output.render_image import render_image
 from relume.scene.model import Material

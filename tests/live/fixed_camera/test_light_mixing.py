@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exact_pictures import exact_image
-from session_edits import BUDGET, make_look, run_until_exact
+from session_edits import BUDGET, kind_of, make_look, run_until_exact
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 
 POINT_LIGHT = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {
@@ -40,7 +39,7 @@ def num_made(picture):
     """Number of jobs until the picture is exact, without previews."""
     made = 0
     while (need := picture.next_job()) is not None:
-        made += not isinstance(need, SparsePreview)
+        made += kind_of(need) != "preview"
         picture.run_next_job(lambda fraction: None, lambda: False)
         picture.advance(None)
     return made
@@ -155,7 +154,7 @@ def test_alternating_gains_and_curves_stay_exact(transfer, lit):
 def test_preparing_a_light_computes_its_image(transfer, lit):
     lit.prepare("/lights/Panel")
     while (need := lit.next_job()) is not None:
-        lit.install(need, need.run(lambda fraction: None, lambda: False))
+        need.apply(need.run(lambda fraction: None, lambda: False))
         assert lit.advance(None).exact
     look = look_with(transfer, changed("Panel", intensity=0.3))
     lit.set_look(look)

@@ -11,13 +11,14 @@ from tiny_scenes import make_camera, mesh, quad
 from relume.assets.environments.environment import Environment
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
+from relume.live.opened.patch_direct_light import SAMPLES_PER_PATCH_POINT, LocalPatchLight
 from relume.look import LightGeometry
-from relume.methods.patch_direct_light import SAMPLES_PER_PATCH_POINT, LocalPatchLight
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.scene.model import Light, Material
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 POINT_LIGHT = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {

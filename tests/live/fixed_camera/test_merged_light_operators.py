@@ -11,19 +11,19 @@ import numpy_reference as ref
 import pytest
 from numpy.typing import NDArray
 from picture_edits import open_exact_picture
-from session_edits import make_look, relative_rmse, run_next_job, run_until_exact
+from session_edits import make_look, relative_rmse, run_next_job, run_until_exact, task_of
 
 from relume.core.cache import Cache
 from relume.core.color import luminance
 from relume.lights.light_clusters import F64, cluster_lights, visible_fraction
-from relume.lights.spherical_triangles import TriangleSubset
+from relume.lights.spherical_triangles import MergedParts
 from relume.live.fixed_camera import operator_budget
 from relume.operators.linear_operator import LinearOperator
 
 FLOOR = "/materials/Floor/terms/1/"
 
 
-def visible_fraction_numpy(visible: NDArray[np.uint8], subset: TriangleSubset, num_clusters: int) -> F64:
+def visible_fraction_numpy(visible: NDArray[np.uint8], subset: MergedParts, num_clusters: int) -> F64:
     """Reference of `visible_fraction` for all points in plain NumPy.
 
     Args:
@@ -98,9 +98,9 @@ def test_edits_use_the_merged_operator_until_the_exact_one_is_ready(transfer, wa
     picture = open_exact_picture(transfer, cache=memory)
     before = picture.image()
     picture.prepare(FLOOR + pointer)
-    assert run_next_job(picture).form == operator_budget.MERGED_LIGHT
+    assert task_of(run_next_job(picture)).form == operator_budget.MERGED_LIGHT
     exact = picture.next_job()
-    assert exact.form == operator_budget.EXACT
+    assert task_of(exact).form == operator_budget.EXACT
     assert not exact.is_refinement
     for change in drags:
         picture.set_look(make_look(transfer, change), active_pointer=FLOOR + pointer)
@@ -108,10 +108,10 @@ def test_edits_use_the_merged_operator_until_the_exact_one_is_ready(transfer, wa
         assert picture.next_job().key == exact.key, "the hand does not stop it"
         expected = ref.full_evaluation(transfer, "front", make_look(transfer, change))
         assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)
-    assert memory.get_cached((*exact.key, "roughly"), LinearOperator).has_merged_lights
-    picture.install(exact, exact.run(lambda fraction: None, lambda: False))
-    assert memory.get_cached((*exact.key, "roughly"), LinearOperator) is None
-    assert memory.get_cached(exact.key, LinearOperator).is_exact
+    assert memory.get_cached((*task_of(exact).key, "roughly"), LinearOperator).has_merged_lights
+    exact.apply(exact.run(lambda fraction: None, lambda: False))
+    assert memory.get_cached((*task_of(exact).key, "roughly"), LinearOperator) is None
+    assert memory.get_cached(task_of(exact).key, LinearOperator).is_exact
     assert picture.advance(None).exact == (pointer == "curves/theta_h")
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
     picture.set_look(make_look(transfer), active_pointer=FLOOR + pointer)
@@ -123,4 +123,4 @@ def test_the_exact_operator_is_built_if_it_is_cached_or_nothing_is_shown(transfe
     open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=memory)
     again = open_exact_picture(transfer, cache=memory)
     again.prepare(FLOOR + "curves/theta_h")
-    assert again.next_job().form == operator_budget.EXACT
+    assert task_of(again.next_job()).form == operator_budget.EXACT

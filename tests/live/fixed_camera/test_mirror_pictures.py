@@ -14,12 +14,13 @@ from relume.assets.environments.equirect import lookup, texel_directions
 from relume.brdf.fresnel import schlick
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import METHODS, open_transfer
+from relume.live.opened.openers import open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.camera_rays import camera_directions
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (64, 48)
 F0 = [0.9, 0.6, 0.3]

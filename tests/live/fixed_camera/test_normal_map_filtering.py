@@ -10,13 +10,14 @@ from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import default_look, validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.reference.image import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
 from relume.scene.roughness_levels import levels_of_material, rougher
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE, FINER, BLOCK = (24, 16), 8, 4
 SLOPES = 0.12

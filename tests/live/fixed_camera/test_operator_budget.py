@@ -9,11 +9,10 @@ import numpy as np
 import numpy_reference as ref
 import pytest
 from picture_edits import open_exact_picture
-from session_edits import make_look, relative_rmse, run_until_exact
+from session_edits import kind_of, make_look, relative_rmse, run_until_exact, task_of
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera import operator_budget
-from relume.live.fixed_camera.jobs import PrecomputeOperator, Shade
 from relume.live.fixed_camera.picture import Picture
 from relume.math.daubechies import analysis
 from relume.operators.linear_operator import operator_bytes
@@ -75,7 +74,7 @@ def test_a_16_bit_operator_is_near_exact_and_then_exact(transfer, half):
         assert (advance.fidelity, advance.exact) == ("near_exact", False)
         error = relative_rmse(picture.image(), shown_exactly(transfer, bent(points)))
         assert 1e-8 < error < A_THOUSANDTH
-    assert isinstance(picture.next_job(), Shade)
+    assert kind_of(picture.next_job()) == "image"
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, bent(points))) < 1e-6
     assert half.used_bytes <= half.budget_bytes
     picture.set_look(make_look(transfer))
@@ -102,8 +101,8 @@ def test_a_subsampled_operator_is_used_if_16_bits_are_too_large(transfer, small,
     before = picture.image()
     picture.prepare(FLOOR + held)
     job = picture.next_job()
-    assert isinstance(job, PrecomputeOperator)
-    assert job.form.step > 1
+    assert kind_of(job) == "operator"
+    assert task_of(job).form.step > 1
     assert job.run(lambda fraction: None, lambda: False).interpolation is not None
     run_until_exact(picture)
     drags = [rough(0.35), rough(0.25)]
@@ -114,7 +113,7 @@ def test_a_subsampled_operator_is_used_if_16_bits_are_too_large(transfer, small,
         assert (advance.fidelity, advance.exact) == ("incremental", False)
         expected = shown_exactly(transfer, change)
         assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)
-    assert isinstance(picture.next_job(), Shade)
+    assert kind_of(picture.next_job()) == "image"
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
     assert small.used_bytes <= small.budget_bytes
     picture.set_look(make_look(transfer))
@@ -137,7 +136,7 @@ def test_edits_during_the_computation_of_an_operator_are_applied(transfer, small
     job = picture.next_job()
     look = bent([[0, 3.0], [20, 0.5], [90, 0]])
     picture.set_look(make_look(transfer, look), active_pointer=FLOOR + "curves/theta_h")
-    picture.install(job, job.run(lambda fraction: None, lambda: False))
+    job.apply(job.run(lambda fraction: None, lambda: False))
     assert picture.advance(None).fidelity == "incremental"
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, look)) < 1e-6
 
@@ -186,14 +185,15 @@ def test_subsampled_operators_include_indirect_light(gathered, monkeypatch):
     before = picture.image()
     picture.prepare(FLOOR + "curves/theta_h")
     job = picture.next_job()
-    assert job.form.step > 1
-    change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *job.target.live.ready.image.shape), np.float32)
-    for form, image in zip((job.form, operator_budget.EXACT), images, strict=True):
-        some = replace(job, form=form, key=form, target=job.target._replace(images=with_budget(picture._images)))
+    assert task_of(job).form.step > 1
+    task = task_of(job)
+    change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *task.target.live.ready.image.shape), np.float32)
+    for form, image in zip((task.form, operator_budget.EXACT), images, strict=True):
+        some = replace(task, form=form, key=form, target=task.target._replace(images=with_budget(picture._images)))
         some.run(lambda fraction: None, lambda: False).add(analysis(change), image)
     assert relative_rmse(images[0], images[1]) < 0.05
     look = bent([[0, 9.0], [25, 1.5], [90, 0]])
-    picture.install(job, job.run(lambda fraction: None, lambda: False))
+    job.apply(job.run(lambda fraction: None, lambda: False))
     picture.set_look(make_look(gathered, look), active_pointer=FLOOR + "curves/theta_h")
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(gathered, look)) < 1e-6
     picture.set_look(make_look(gathered))

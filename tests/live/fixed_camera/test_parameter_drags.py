@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy_reference as ref
 import pytest
-from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, make_look, relative_rmse, run_until_exact, task_of
 
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
@@ -39,7 +39,7 @@ def exact(transfer, change):
 
 
 def make(picture, need):
-    picture.install(need, need.run(lambda fraction: None, lambda: False))
+    need.apply(need.run(lambda fraction: None, lambda: False))
 
 
 def prepare(picture, pointer):
@@ -94,7 +94,7 @@ def test_shading_of_an_outdated_look_is_not_shown(transfer, picture):
 @pytest.mark.parametrize("hand", [None, THETA_H, "/lights/Lamp"])
 def test_the_active_control_is_never_inferred_from_looks(transfer, picture, hand):
     picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=hand)
-    assert isinstance(picture.next_job().basis, CurveBasis)
+    assert isinstance(task_of(picture.next_job()).basis, CurveBasis)
 
 
 def test_pointers_to_no_control_are_rejected_and_the_look_stays(transfer, picture):
@@ -107,8 +107,8 @@ def test_pointers_to_no_control_are_rejected_and_the_look_stays(transfer, pictur
 def test_an_unprepared_control_is_inferred_from_its_edits(transfer, picture):
     picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=ROUGHNESS)
     need = picture.next_job()
-    assert isinstance(need.basis, ParameterOperator)
-    assert need.basis.parameter == "roughness"
+    assert isinstance(task_of(need).basis, ParameterOperator)
+    assert task_of(need).basis.parameter == "roughness"
     make(picture, need)
     picture.set_look(make_look(transfer, shiny(0.6)))
     assert picture.advance(None).changed
@@ -145,8 +145,8 @@ def test_a_drawn_curve_is_not_represented_by_nodes(transfer, picture):
     drawn = shiny(0.2, {"theta_h": {"points": [[0, 3], [20, 0.2], [60, 2]]}})
     picture.set_look(make_look(transfer, drawn))
     need = picture.next_job()
-    assert isinstance(need.basis, CurveBasis)
-    assert need.basis.name == "theta_h"
+    assert isinstance(task_of(need).basis, CurveBasis)
+    assert task_of(need).basis.name == "theta_h"
     make(picture, need)
     assert picture.advance(None).exact
     assert relative_rmse(picture.image(), exact(transfer, drawn)) < 1e-6

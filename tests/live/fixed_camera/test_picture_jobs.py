@@ -8,13 +8,11 @@ import numpy as np
 import numpy_reference as ref
 import pytest
 from picture_edits import BALL, WALL, ignore_progress, open_exact_picture, set_sigma, set_single_term_ball
-from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, kind_of, make_look, relative_rmse, run_until_exact, task_of
 
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, MemoryBudgetError
-from relume.live.fixed_camera.jobs import Resum, Shade
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.operators.linear_operator import operator_bytes
 
 
@@ -84,7 +82,7 @@ def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
     assert advance.fidelity == "approximate"
     np.testing.assert_array_equal(picture.image(), before)
     job = picture.next_job()
-    assert isinstance(job, Shade)
+    assert kind_of(job) == "image"
     assert job.is_refinement
     expected = ref.full_evaluation(transfer, "front", look)
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
@@ -96,11 +94,11 @@ def test_a_curve_without_operator_is_shaded_while_a_rotation_is_prepared(transfe
     picture = open_exact_picture(transfer, cache=Cache(400_000))
     picture.prepare("/environment/rotation")
     job = picture.next_job()
-    assert isinstance(job, SparsePreview)
+    assert kind_of(job) == "preview"
     look = make_look(transfer, drawn)
     picture.check(look)
     picture.set_look(look)
-    picture.install(job, job.run(ignore_progress, lambda: False))
+    job.apply(job.run(ignore_progress, lambda: False))
     assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
 
@@ -136,9 +134,9 @@ def test_a_prepared_curve_is_followed_during_another_freeze(transfer):
         assert relative_rmse(picture.image(), ref.full_evaluation(transfer, "front", look)) < 1e-5
     thread.join()
     before = picture.image()
-    picture.install(need, made[0])
+    need.apply(made[0])
     job = picture.next_job()
-    assert job is None or isinstance(job, Resum)  # rounding of the drag's steps, when it stops
+    assert job is None or kind_of(job) == "resum"  # rounding of the drag's steps, when it stops
     np.testing.assert_array_equal(picture.image(), before)
     picture.highlight_pixels(WALL + "alpha", 0, 10)  # it is prepared now
 
@@ -150,7 +148,7 @@ def test_an_operator_with_outdated_fixed_curves_is_not_used(transfer):
     look = make_look(transfer, set_sigma(0.2, ior=3.0))
     picture.set_look(look)
     assert picture.advance(None).exact  # θd, which is fixed in the operator
-    picture.install(need, need.run(ignore_progress, lambda: False))
+    need.apply(need.run(ignore_progress, lambda: False))
     assert picture.next_job().key != need.key
     assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
@@ -158,15 +156,15 @@ def test_an_operator_with_outdated_fixed_curves_is_not_used(transfer):
 def test_an_older_image_is_shown_until_a_newer_one_is_ready(transfer):
     """Otherwise a continuous edit would never show the material."""
     picture = Picture(transfer, "front", Cache(BUDGET))
-    while (need := picture.next_job()).term.model != "cook_torrance":
-        picture.install(need, need.run(ignore_progress, lambda: False))
+    while task_of(need := picture.next_job()).term.model != "cook_torrance":
+        need.apply(need.run(ignore_progress, lambda: False))
     look = make_look(transfer, set_sigma(0.1))
     picture.set_look(look)
-    picture.install(need, need.run(ignore_progress, lambda: False))
+    need.apply(need.run(ignore_progress, lambda: False))
     advance = picture.advance(None)
     assert advance.changed
     assert not advance.exact
-    assert picture.next_job().basis.affected_curves == ("theta_h",)
+    assert task_of(picture.next_job()).basis.affected_curves == ("theta_h",)
     assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
 
@@ -181,9 +179,9 @@ def test_an_opening_picture_shows_cheap_terms_first(transfer):
         for pointer in touched:
             picture.prepare(pointer)
         made = []
-        while (need := picture.next_job()) is not None and isinstance(need, Shade):
-            made.append((need.target.name, need.term.model))
-            picture.install(need, need.run(ignore_progress, lambda: False))
+        while (need := picture.next_job()) is not None and kind_of(need) == "image":
+            made.append((task_of(need).target.name, task_of(need).term.model))
+            need.apply(need.run(ignore_progress, lambda: False))
         return made, need
 
     shaded, _ = order()
@@ -193,7 +191,7 @@ def test_an_opening_picture_shows_cheap_terms_first(transfer):
     assert [name for name, _ in shaded[:num_materials]] == sorted(sizes, key=sizes.get)[-num_materials:]
     shaded, need = order("/materials/Wall/terms/0/curves/theta_d")
     assert shaded == [("Wall", "lambert")]
-    assert need.basis.affected_curves == ("theta_d",)  # its operator also gives the image
+    assert task_of(need).basis.affected_curves == ("theta_d",)  # its operator also gives the image
 
 
 def test_results_of_a_removed_term_are_discarded(transfer):
@@ -202,5 +200,5 @@ def test_results_of_a_removed_term_are_discarded(transfer):
     need = picture.next_job()
     look = make_look(transfer, set_single_term_ball)
     picture.set_look(look)
-    picture.install(need, need.run(ignore_progress, lambda: False))
+    need.apply(need.run(ignore_progress, lambda: False))
     assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6

@@ -7,14 +7,11 @@ from itertools import count
 import numpy as np
 import numpy_reference as ref
 import pytest
-from session_edits import BUDGET, make_look, run_next_job, run_until_exact
+from session_edits import BUDGET, kind_of, make_look, run_next_job, run_until_exact, task_of
 
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError
-from relume.live.fixed_camera.jobs import Shade
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.priority_region import ShadeRegion
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.operators.shade import shade_rows
 
 REGION = (4, 6, 16, 12)
@@ -24,7 +21,7 @@ REGION = (4, 6, 16, 12)
 def large(monkeypatch):
     """Treat small pictures like large ones, in steps as small as the visible region."""
     for name, value in {
-        "priority_region._MIN_HIDDEN_SAMPLES": 0,
+        "strategies.shade._MIN_HIDDEN_SAMPLES": 0,
         "strategies.sparse_preview._MAX_SHADED_AT_ONCE": 0,
         "strategies.sparse_preview._MAX_SHADED": 40,
     }.items():
@@ -47,7 +44,7 @@ def opened(transfer, region=REGION):
     picture.set_look(make_look(transfer, lambda document: document["environment"].update(rotation=degrees)))
     picture.look_at(region)
     picture.advance(None)
-    assert isinstance(run_next_job(picture), SparsePreview)
+    assert kind_of(run_next_job(picture)) == "preview"
     return picture
 
 
@@ -64,7 +61,7 @@ def test_the_visible_region_is_exact_first(request, method):
     transfer = request.getfixturevalue(method)
     picture = opened(transfer)
     made = run_until_visible_is_exact(picture)
-    assert any(isinstance(job, ShadeRegion) for job in made)
+    assert any(kind_of(job) == "region" for job in made)
     assert not picture.advance(None).exact
     early = picture.image()
     whole = run_until_exact(picture).image()
@@ -86,7 +83,7 @@ def test_another_region_becomes_exact_when_it_is_visible(transfer):
 
 def test_interrupted_shading_resumes(transfer, monkeypatch):
     picture = opened(transfer, None)
-    while isinstance(job := picture.next_job(), SparsePreview) or job.target.material.num_samples < 100:
+    while kind_of(job := picture.next_job()) == "preview" or task_of(job).target.material.num_samples < 100:
         run_next_job(picture)
     shaded, requested = [], []
     monkeypatch.setattr(
@@ -94,11 +91,11 @@ def test_interrupted_shading_resumes(transfer, monkeypatch):
     )
     with pytest.raises(CancelledError):
         job.run(lambda fraction: None, lambda: requested.append(1) or len(requested) > 2)
-    assert isinstance(job, Shade)
+    assert kind_of(job) == "image"
     assert shaded
     job.run(lambda fraction: None, lambda: False)
     assert sorted(shaded) == sorted(set(shaded))
-    assert sum(stop - start for start, stop in shaded) == job.target.material.num_samples
+    assert sum(stop - start for start, stop in shaded) == task_of(job).target.material.num_samples
 
 
 def test_a_large_picture_is_refined_progressively(transfer, monkeypatch):
@@ -106,7 +103,7 @@ def test_a_large_picture_is_refined_progressively(transfer, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MIN_FINER_RATIO", 1)
     picture, images = opened(transfer, None), []
     while not picture.advance(None).exact:
-        if isinstance(run_next_job(picture), SparsePreview):
+        if kind_of(run_next_job(picture)) == "preview":
             picture.advance(None)
             images.append(picture.image())
     errors = [float(np.sqrt(np.mean((image - picture.image()) ** 2))) for image in images]

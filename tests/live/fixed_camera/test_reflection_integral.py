@@ -17,12 +17,13 @@ from relume.brdf.curves import curve_values
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.scene_folder import load_scene, save_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 EDITED = {
     "materials": {

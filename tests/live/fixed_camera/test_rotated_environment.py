@@ -12,11 +12,12 @@ from session_edits import make_look, relative_rmse, run_until_exact
 from tiny_scenes import still_life
 
 from relume.core.cache import Cache
-from relume.methods.registry import METHODS, open_transfer
+from relume.live.opened.openers import open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 
 @pytest.mark.parametrize("degrees", [30.0, -90.0])

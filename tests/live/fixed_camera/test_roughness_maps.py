@@ -6,19 +6,18 @@ import numpy as np
 import numpy_reference as ref
 import pytest
 from exact_pictures import exact_image
-from session_edits import BUDGET, bake_corner_scene, make_look, relative_rmse, run_next_job, run_until_exact
+from session_edits import BUDGET, bake_corner_scene, kind_of, make_look, relative_rmse, run_next_job, run_until_exact
 from tiny_scenes import corner
 
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.incremental_light import PrecomputeRows
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
-from relume.methods.registry import METHODS, open_transfer
+from relume.live.opened.openers import open_transfer
+from relume.methods.registry import METHODS
 from relume.reference import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.views.view import open_view
 
 FLOOR = "/materials/Floor/terms/1/"
@@ -170,7 +169,7 @@ def test_a_material_without_a_map_has_none_to_follow(direct) -> None:
 def test_a_rotation_is_previewed_and_then_exact(direct) -> None:
     picture, look = shown(direct), changed(direct, turn=40.0)
     picture.set_look(look, active_pointer="/environment/rotation")
-    assert isinstance(run_next_job(picture), SparsePreview)
+    assert kind_of(run_next_job(picture)) == "preview"
     picture.advance(None)
     exact = exact_image(direct, look)
     assert relative_rmse(picture.image(), exact) < 0.25
@@ -184,7 +183,7 @@ def test_a_moved_light_is_followed(gather) -> None:
     made = []
     while picture.next_job() is not None:
         made.append(run_next_job(picture))
-    assert any(isinstance(job, PrecomputeRows) for job in made)
+    assert any(kind_of(job) == "rows" for job in made)
     look = changed(gather, light=[0.0, 0.9, 0.5])
     picture.set_look(look, active_pointer="/lights/lamp")
     assert not picture.advance(8).exact

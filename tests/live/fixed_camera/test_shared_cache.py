@@ -10,7 +10,7 @@ from session_edits import BUDGET, make_look
 
 from relume.core.cache import Cache
 from relume.core.memory_usage import live_bytes
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.output.render_image import render_image
 
 POINT_LIGHT = {"kind": "point", "position": [0.3, 1.0, 0.4]}

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy_reference as ref
 import pytest
-from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, kind_of, make_look, relative_rmse, run_until_exact
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview, choose_samples
+from relume.live.fixed_camera.strategies.sparse_preview import choose_samples
 
 
 def rotated(degrees):
@@ -25,7 +25,7 @@ def picture(transfer):
 
 
 def make(picture, need):
-    picture.install(need, need.run(lambda fraction: None, lambda: False))
+    need.apply(need.run(lambda fraction: None, lambda: False))
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_a_rotation_is_previewed_at_once_and_then_shaded(transfer, picture):
     still = picture.image()
     picture.set_look(make_look(transfer, rotated(70)))
     need = picture.next_job()
-    assert isinstance(need, SparsePreview)
+    assert kind_of(need) == "preview"
     assert not need.is_refinement
     make(picture, need)
     advance = picture.advance(None)
@@ -61,7 +61,7 @@ def test_a_continuous_rotation_is_followed(transfer, picture):
     picture.set_look(make_look(transfer, rotated(40)))
     make(picture, need)
     assert picture.advance(None).changed
-    assert isinstance(picture.next_job(), SparsePreview)
+    assert kind_of(picture.next_job()) == "preview"
     assert picture.next_job().key != need.key
     make(picture, picture.next_job())
     picture.advance(None)
@@ -73,7 +73,7 @@ def test_preparing_the_rotation_selects_samples_only(transfer, picture):
     before = picture.image()
     picture.prepare("/environment/rotation")
     need = picture.next_job()
-    assert isinstance(need, SparsePreview)
+    assert kind_of(need) == "preview"
     make(picture, need)
     assert picture.next_job() is None
     assert picture.advance(None).exact
@@ -83,14 +83,14 @@ def test_preparing_the_rotation_selects_samples_only(transfer, picture):
 def test_an_empty_picture_is_shaded_without_preview(transfer):
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(make_look(transfer, rotated(70)))
-    assert not isinstance(picture.next_job(), SparsePreview)
+    assert kind_of(picture.next_job()) != "preview"
     assert not picture.next_job().is_refinement
 
 
 def test_without_memory_there_is_no_preview(transfer):
     picture = run_until_exact(Picture(transfer, "front", Cache(200_000)))
     picture.set_look(make_look(transfer, rotated(70)))
-    assert not isinstance(picture.next_job(), SparsePreview)
+    assert kind_of(picture.next_job()) != "preview"
 
 
 @pytest.mark.usefixtures("few")

@@ -13,13 +13,14 @@ from relume.assets.environments.environment_store import STORE, store_environmen
 from relume.core.cache import Cache
 from relume.core.errors import NotFoundError
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import default_look, validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.reference import reference_image
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (48, 36)
 

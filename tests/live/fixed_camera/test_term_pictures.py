@@ -9,11 +9,12 @@ from tiny_scenes import still_life
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import METHODS, open_transfer
+from relume.methods.registry import METHODS
 from relume.reference import reference_image
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE, NUM_LIGHTS = (32, 24), 1500
 # Error of 1,500 triangles with one shadow ray each: shadow edges move by up to a triangle, for all terms alike

@@ -7,12 +7,13 @@ from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 from relume.core.cache import Cache
 from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, resolve, samples_per_edge
 from relume.live.free_camera.primary_visibility import trace_primary
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA = make_camera("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
 SIZE = (48, 36)

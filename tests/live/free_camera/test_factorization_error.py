@@ -8,7 +8,7 @@ from test_outgoing_coefficients import document
 from relume.brdf.evaluate import eval_brdf
 from relume.live.free_camera.basis.factorization_error import BOUND, factorization_error
 from relume.live.free_camera.basis.outgoing_coefficients import cosines, outgoing_coefficients
-from relume.math.zernike import NUM_FUNCTIONS, num_functions, project
+from relume.math.zernike import NUM_FUNCTIONS, basis_functions, num_functions
 
 
 def test_one_function_is_enough_for_a_diffuse_surface():
@@ -32,7 +32,7 @@ def test_sharper_highlights_need_more_functions_up_to_mirrors():
 def test_the_error_is_the_residual_of_a_projection(exponent):
     term = document("blinn_phong", params={"exponent": exponent})
     wi, weight = hemisphere(64, 128)
-    functions, cosine = project(wi), cosines()
+    functions, cosine = basis_functions(wi), cosines()
     missed = outgoing_coefficients(term).residual_by_degree
     for degree in (0, 3, 7):
         basis, left = functions[:, : num_functions(degree)], []

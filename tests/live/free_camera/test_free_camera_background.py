@@ -21,10 +21,11 @@ from tiny_scenes import studio
 
 from relume.core.cache import Cache
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 WHITE, COLOR = background(kind="color", color=[1.0, 1.0, 1.0]), background(kind="color", color=[2.0, 1.0, 0.5])
 TRANSPARENT = background(kind="transparent")

@@ -9,16 +9,17 @@ from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 from relume.assets.environments.equirect import texel_directions
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.free_camera.adaptive_shadows import visible_fractions
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.hard_shadows.adaptive_shadows import visible_fractions
-from relume.live.free_camera.probe_light.incident import combine_all
+from relume.live.free_camera.incident_light import combine_all
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.visibility import trace_visibility
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA = make_camera("front", [0.5, 2.2, 2.6], [0, 0.2, 0], 0.7)
 SIZE = (96, 72)

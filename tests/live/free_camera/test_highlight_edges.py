@@ -8,12 +8,13 @@ from relume.core.cache import Cache
 from relume.core.color import LUMINANCE
 from relume.live.free_camera import highlight_edges
 from relume.live.free_camera.highlight_edges import RAY_POSITIONS, find_highlight_edges
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA = make_camera("front", [0.3, 0.8, 3], [0, 0.5, 0], 0.8)
 SIZE, FINER = (32, 24), 6

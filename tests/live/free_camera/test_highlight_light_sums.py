@@ -25,11 +25,12 @@ from relume.live.free_camera.highlights.light_sum_kernel import (
     EnvironmentLights,
     sum_lights,
 )
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 CAMERA_POSITION = np.array([0.4, 1.5, 3.0], np.float32)
@@ -118,7 +119,7 @@ def test_the_kernel_equals_its_reference(surface, term):
     lights = EnvironmentLights.from_lights(*lights_of(rng, 152, rng.uniform(0, 0.3, 152)))
     visible = rng.integers(0, 256, (num, 19)).astype(np.uint8)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    actual = sum_lights(surface, visible, lights, lobes, CAMERA_POSITION, is_needed)
+    actual = sum_lights(surface.viewed_from(CAMERA_POSITION, is_needed), visible, lights, lobes)
     assert not actual[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::7]:
         expected = sum_lights_numpy(surface, visible, lights, lobes, CAMERA_POSITION, point)
@@ -140,14 +141,8 @@ def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
     assert not lobes.lobe_confidence[0, cosines() > 0.4].any()
     towards, light, radius = lights_of(rng, 400, 0.01)
     bits = rng.integers(0, 256, (num, 50)).astype(np.uint8)
-    actual = sum_lights(
-        surface,
-        bits,
-        EnvironmentLights.from_lights(towards, light, radius),
-        lobes,
-        CAMERA_POSITION,
-        np.ones(num, np.uint8),
-    )
+    viewed = surface.viewed_from(CAMERA_POSITION, np.ones(num, np.uint8))
+    actual = sum_lights(viewed, bits, EnvironmentLights.from_lights(towards, light, radius), lobes)
     difference, size = [], []
     for point in facing(surface, 0.4):
         n, t = surface.probes.normal[point], surface.probes.tangent[point, :3]
@@ -171,9 +166,8 @@ def test_a_white_environment_preserves_energy(surface, roughness):
     light = np.broadcast_to(tiles.solid_angles[:, None], (2048, 3)).astype(np.float32)
     radius = np.linalg.norm(tiles.corners[:, 0] - tiles.centroids, axis=1)
     lights = EnvironmentLights.from_lights(tiles.centroids.astype(np.float32), light, radius.astype(np.float32))
-    summed = sum_lights(
-        surface, np.full((num, 256), 255, np.uint8), lights, lobes, CAMERA_POSITION, np.ones(num, np.uint8)
-    )
+    viewed = surface.viewed_from(CAMERA_POSITION, np.ones(num, np.uint8))
+    summed = sum_lights(viewed, np.full((num, 256), 255, np.uint8), lights, lobes)
     ratios = []
     for point in facing(surface, 0.4)[::3]:
         wo = CAMERA_POSITION - surface.probes.position[point]

@@ -17,7 +17,7 @@ from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS, white_
 from relume.live.free_camera.basis.table_index import MIN_COSINE
 from relume.live.free_camera.environment_lookup import build_environment_lookup, rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.highlights.interpolated_highlights import add_environment_highlights
+from relume.live.free_camera.highlights.interpolated_highlights import ProbeHighlights, add_environment_highlights
 from relume.live.free_camera.highlights.lobe_light_lists import (
     _DIRECTION_BINS,
     _SHARPNESS,
@@ -30,18 +30,19 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
     sigma_at_width,
 )
 from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
-from relume.live.free_camera.probes.density import density_from_distance
-from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, mesh_components, place_probes
-from relume.live.free_camera.probes.visible_sides import visible_sides
 from relume.live.free_camera.shade_pixels import shade_pixels
 from relume.live.free_camera.shade_probes import ProbeRadiance
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.probes.density import density_from_distance
+from relume.probes.mesh_lattice import make_corner_grid, mesh_components, place_probes
+from relume.probes.visible_sides import visible_sides
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
 BROAD_TERM = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
@@ -200,17 +201,9 @@ def test_probes_add_the_difference_to_the_lobe_of_pixels(shiny_ball, term, rotat
     environment_light = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    add_environment_highlights(
-        surface,
-        lobes,
-        light,
-        camera_position,
-        visibility,
-        lit,
-        is_needed,
-        ProbeRadiance(sent, environment_light),
-        is_fine=is_fine,
-    )
+    viewed, highlights = surface.viewed_from(camera_position, is_needed), ProbeHighlights(visibility, lit)
+    outgoing = ProbeRadiance(sent, environment_light)
+    add_environment_highlights(viewed, lobes, light, highlights, surface.normal_variation, outgoing, is_fine=is_fine)
     assert not sent[is_needed == 0].any()
     held, max_ratio = 0, float(lobes.max_ratio[0])
     for point in np.flatnonzero(is_needed)[::17]:
@@ -246,17 +239,9 @@ def test_lobes_narrower_than_lights_use_the_lobe_only(shiny_ball):
     environment_light = rng.normal(size=(num, 3, 3)).astype(np.float32)
     camera_position, visibility = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
     nothing, light = np.zeros((num, 3), np.float32), lobe_environment()
-    add_environment_highlights(
-        surface,
-        lobes,
-        light,
-        camera_position,
-        visibility,
-        nothing,
-        everywhere,
-        ProbeRadiance(sent, environment_light),
-        is_fine=True,
-    )
+    viewed, highlights = surface.viewed_from(camera_position, everywhere), ProbeHighlights(visibility, nothing)
+    outgoing = ProbeRadiance(sent, environment_light)
+    add_environment_highlights(viewed, lobes, light, highlights, surface.normal_variation, outgoing, is_fine=True)
     assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
 
 
@@ -271,9 +256,8 @@ def test_lobe_visibility_equals_the_visibility_bits(shiny_ball):
     listed = build_light_lists(directions, radius, luminous, lobe_weights, lobe_widths(lobes))
     bits = rng.integers(0, 2, (num, 8 * ((num_lights + 7) // 8)), np.uint8)
     camera_position, is_needed = np.array([0.4, 1.5, 3.0], np.float32), (np.arange(num) % 3 > 0).astype(np.uint8)
-    actual = trace_lobe_visibility(
-        surface, np.packbits(bits, axis=1, bitorder="little"), listed, lobes, camera_position, is_needed
-    )
+    viewed = surface.viewed_from(camera_position, is_needed)
+    actual = trace_lobe_visibility(viewed, np.packbits(bits, axis=1, bitorder="little"), listed, lobes)
     assert not actual[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::13]:
         towards, shares, sigma = two_lobes_numpy(lobes, surface, camera_position.astype(np.float64), point)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.live.free_camera.probes.lattice_nodes import (
+from relume.probes.lattice_nodes import (
     _POSITION_BITS,
     _U64,
     NodeTable,

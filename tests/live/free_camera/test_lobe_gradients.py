@@ -17,15 +17,16 @@ from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.highlights.lobe_gradients import F32, F64, gradients_along_lobe
 from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
-from relume.math.zernike import DEGREES, WINDOW_DECAY, project
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.math.zernike import DEGREES, WINDOW_DECAY, basis_functions
+from relume.methods.registry import METHODS
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA, SIZE = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
 CAMERA_POSITION = CAMERA.to_world[:3, 3].astype(np.float32)
@@ -96,7 +97,7 @@ def distant_light(points):
     n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
     wi = np.einsum("nij,lj->nli", np.stack([t, np.cross(n, t), n], axis=1), towards)
     cosine = np.maximum(wi[..., 2], 0)
-    return np.einsum("nl,lc,nlk->nck", cosine, light, project(wi)).astype(np.float32)
+    return np.einsum("nl,lc,nlk->nck", cosine, light, basis_functions(wi)).astype(np.float32)
 
 
 @pytest.mark.parametrize("terms", [[METAL], [METAL, COAT]])
@@ -104,7 +105,7 @@ def test_gradients_equal_finite_differences(free_bake, terms):
     surface, tables, lobes = free_bake.stored_scene, build_tables([terms]), build_lobes([terms])
     others, num = distant_light(surface.probes), surface.probes.num_points
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    actual = gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, is_needed)
+    actual = gradients_along_lobe(surface.viewed_from(CAMERA_POSITION, is_needed), others, tables, lobes)
     assert not actual[is_needed == 0].any()
     expected = np.array(
         [gradients_along_lobe_numpy(surface, others, tables, lobes, CAMERA_POSITION, p) for p in range(0, num, 5)]
@@ -119,12 +120,9 @@ def test_gradients_are_zero_without_highlight_or_light(free_bake):
     surface, num = free_bake.stored_scene, free_bake.stored_scene.probes.num_points
     dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
     others = distant_light(surface.probes)
-    assert not gradients_along_lobe(
-        surface, others, build_tables([dull]), build_lobes([dull]), CAMERA_POSITION, everywhere
-    ).any()
-    assert not gradients_along_lobe(
-        surface, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]]), CAMERA_POSITION, everywhere
-    ).any()
+    viewed = surface.viewed_from(CAMERA_POSITION, everywhere)
+    assert not gradients_along_lobe(viewed, others, build_tables([dull]), build_lobes([dull])).any()
+    assert not gradients_along_lobe(viewed, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]])).any()
 
 
 def pixels(free_bake, gain):
@@ -132,8 +130,9 @@ def pixels(free_bake, gain):
     surface, tables, lobes = free_bake.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
     gbuffer = trace_primary(surface, free_bake.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
     others, everywhere = distant_light(surface.probes), np.ones(surface.probes.num_points, np.uint8)
-    outgoing = shade_probes(surface, np.zeros_like(others), others, tables, CAMERA_POSITION, everywhere).radiance
-    gradients = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, everywhere)
+    viewed = surface.viewed_from(CAMERA_POSITION, everywhere)
+    outgoing = shade_probes(viewed, np.zeros_like(others), others, tables).radiance
+    gradients = np.float32(gain) * gradients_along_lobe(viewed, others, tables, lobes)
     broad, turn = (interpolate_to_nodes(surface, gbuffer.is_visible, values) for values in (outgoing, gradients))
     dark, nothing = np.zeros((1, 3), np.float32), np.empty((0, 3), np.float32)
     no_environment = PrefilteredEnvironment(
@@ -152,8 +151,8 @@ def pixels(free_bake, gain):
     fields = (np.ascontiguousarray(values, np.float32) for values in (position, normal, tangent))
     points = SurfacePoints(*fields, hit.astype(np.uint32))
     exactly = replace(surface, probes=points, material=np.zeros(len(hit), surface.material.dtype))
-    light, every = distant_light(points), np.ones(len(hit), np.uint8)
-    expected = shade_probes(exactly, np.zeros_like(light), light, tables, CAMERA_POSITION, every).radiance[:, 0]
+    light, viewed = distant_light(points), exactly.viewed_from(CAMERA_POSITION, np.ones(len(hit), np.uint8))
+    expected = shade_probes(viewed, np.zeros_like(light), light, tables).radiance[:, 0]
     inside = np.einsum("nc,nc->n", normal, -gbuffer.directions[hit]) > 0.3
     return radiance[hit][inside], expected[inside]
 

@@ -7,14 +7,15 @@ from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 from relume.core.cache import Cache
 from relume.core.color import LUMINANCE
 from relume.live.free_camera.normal_mapping import F32, F64, basis_gradients, light_gradient
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.math.zernike import NUM_FUNCTIONS, project
-from relume.methods.registry import METHODS, open_bake
+from relume.math.zernike import NUM_FUNCTIONS, basis_functions
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Material, Texture
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 WAVES = 4
 LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)
@@ -80,7 +81,7 @@ def test_the_gradient_of_a_few_lights_is_their_mean_direction(tmp_path):
     rng = np.random.default_rng(4)
     wi = rng.normal(size=(400, 3)) * [0.5, 0.5, 0.2] + [0, 0, 1]
     wi /= np.linalg.norm(wi, axis=1, keepdims=True)
-    vectors = np.einsum("s,sk->k", wi[:, 2], project(wi)) / len(wi)
+    vectors = np.einsum("s,sk->k", wi[:, 2], basis_functions(wi)) / len(wi)
     np.testing.assert_allclose(basis_gradients() @ vectors, wi.mean(axis=0), atol=0.03)
 
 

@@ -9,12 +9,13 @@ from relume.core.cache import Cache
 from relume.live.free_camera import free_camera_picture as picture_module
 from relume.live.free_camera.occluded_probes import reweight
 from relume.live.free_camera.primary_visibility import trace_primary
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (64, 48)
 CAMERA = make_camera("front", [0.9, 1.4, 2.4], [0, 0.1, 0], 0.6)

@@ -7,18 +7,19 @@ from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.core.cache import Cache
 from relume.lights.spherical_triangles import tessellate_environment
-from relume.live.free_camera.probes.density import density_from_distance, density_from_shadows
-from relume.live.free_camera.probes.interpolation_weights import make_weights_linear
-from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_probes
-from relume.live.free_camera.probes.triangle_grids import enumerate_nodes
-from relume.live.free_camera.probes.visible_sides import visible_sides
+from relume.live.opened.openers import open_bake
 from relume.look import validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.probes.density import density_from_distance, density_from_shadows
+from relume.probes.interpolation_weights import make_weights_linear
+from relume.probes.mesh_lattice import make_corner_grid, place_probes
+from relume.probes.triangle_grids import enumerate_nodes
+from relume.probes.visible_sides import visible_sides
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA_POSITION = np.array([[0.0, 3.0, 4.0]])
 

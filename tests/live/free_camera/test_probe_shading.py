@@ -15,19 +15,20 @@ from relume.live.free_camera.basis.material_tables import build_tables
 from relume.live.free_camera.environment_lookup import rotation_of, sample
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
-from relume.live.free_camera.probes.density import density_from_distance
-from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_probes
-from relume.live.free_camera.probes.triangle_grids import ProbeDensity, node_index, num_nodes
-from relume.live.free_camera.probes.visible_sides import visible_sides
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
+from relume.live.opened.openers import open_bake
 from relume.look import EnvironmentKey
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
+from relume.probes.density import density_from_distance
+from relume.probes.mesh_lattice import make_corner_grid, place_probes
+from relume.probes.triangle_grids import ProbeDensity, node_index, num_nodes
+from relume.probes.visible_sides import visible_sides
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.texture import MipMap
 from relume.scene.model import Camera
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 BROAD_WIDTHS = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the basis can represent
 
@@ -147,8 +148,9 @@ def test_probe_radiance_equals_its_reference(free_bake):
     rng = np.random.default_rng(9)
     num = free_bake.stored_scene.probes.num_points
     vectors, others = (rng.normal(size=(num, 3, 36)).astype(np.float32) for _ in range(2))
-    camera_position, everywhere = np.array([0.3, 1.2, 2.0], np.float32), np.ones(num, np.uint8)
-    actual = shade_probes(free_bake.stored_scene, vectors, others, tables, camera_position, everywhere)
+    camera_position = np.array([0.3, 1.2, 2.0], np.float32)
+    viewed = free_bake.stored_scene.viewed_from(camera_position, np.ones(num, np.uint8))
+    actual = shade_probes(viewed, vectors, others, tables)
     for point in range(0, num, num // 60):
         for arrays, expected in zip(
             actual,
@@ -157,16 +159,13 @@ def test_probe_radiance_equals_its_reference(free_bake):
         ):
             np.testing.assert_allclose(arrays[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
     assert actual.environment.any()
-    none = shade_probes(free_bake.stored_scene, vectors, others, tables, camera_position, np.zeros(num, np.uint8))
+    unneeded = free_bake.stored_scene.viewed_from(camera_position, np.zeros(num, np.uint8))
+    none = shade_probes(unneeded, vectors, others, tables)
     assert not none.radiance.any()
     assert not none.environment.any()
     has_highlight = (free_bake.stored_scene.material % 3 > 0) & (actual.radiance[:, 0].max(axis=1) > 0)
     assert has_highlight.any()
-    assert (
-        not shade_probes(free_bake.stored_scene, vectors, None, tables, camera_position, everywhere)
-        .radiance[has_highlight]
-        .any()
-    )
+    assert not shade_probes(viewed, vectors, None, tables).radiance[has_highlight].any()
 
 
 def test_textures_of_pixels_equal_those_of_bakes(free_bake):

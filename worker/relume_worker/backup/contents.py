@@ -1,4 +1,4 @@
-"""Files of a data directory that belong in a backup: without the ledger, running work, and derived files."""
+"""Files of a data directory that belong in a backup: without the database, unfinished jobs and derived files."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class FileEntry:
     """A file of a backup.
 
     Attributes:
-        path: below the data directory, with "/".
-        num_bytes, mtime_ns: equal if the file has not changed.
+        path: path below the data directory, with "/".
+        num_bytes, mtime_ns: size and modification time, used to detect changes.
         sha256: expected digest; None if it is unknown.
     """
 
@@ -45,7 +45,7 @@ class FileEntry:
 
 
 def walk_files(data_dir: Path) -> Iterator[FileEntry]:
-    """Yield the files, sorted; of a published store those in its manifest, which never change."""
+    """Yield the files in sorted order; for a published store, the files in its manifest, which never change."""
     digests: dict[str, str] = {}
     for folder, folders, names in os.walk(data_dir):
         relative_folder = Path(folder).relative_to(data_dir).as_posix()

@@ -1,7 +1,8 @@
-"""Create a backup while everything runs: the ledger first, then the files that it names and all others.
+"""Create a backup while everything runs: the ledger first, then the files that it refers to, then all others.
 
-Scenes and stores are on the disk before the ledger names them, and never change. Files that the ledger's copy names and
-that are missing were deleted meanwhile: then the backup starts again, which is cheap because nothing is copied twice.
+Scenes and stores are on the disk before the ledger refers to them, and never change. If a file that the copied ledger
+refers to is missing, it was deleted meanwhile; the backup then starts again, which is cheap since no file is copied
+twice.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ def create_backup(
     copied files.
 
     Args:
-        data_dir: to back up. ledger: of it.
+        data_dir: data directory to back up. ledger: ledger of this directory.
         repository: the backup folder, created if missing.
-        start_report: for progress.
+        start_report: starts a progress report.
     Returns:
         The snapshot; `left_out` lists missing and damaged files.
     Raises:

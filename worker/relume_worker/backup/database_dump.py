@@ -14,11 +14,11 @@ ROWS_PER_BATCH = 1000
 
 
 def copy_ledger(source: Engine, path: Path) -> None:
-    """Copy all rows of one moment, while the ledger is in use.
+    """Copy all rows as of one moment, while the ledger is in use.
 
     Args:
         source: ledger of the newest revision.
-        path: of the file, which must not exist.
+        path: path of the file, which must not exist.
     """
     target = open_database(f"sqlite:///{path}")
     try:
@@ -34,7 +34,7 @@ def fill_ledger(path: Path, target: Engine) -> None:
     """Fill an empty ledger with the rows of a copy, all or none.
 
     Args:
-        path: of the copy; upgraded if it is of an older version. target: ledger of the newest revision.
+        path: path of the copy; upgraded if it is of an older version. target: ledger of the newest revision.
     """
     source = open_database(f"sqlite:///{path}")
     try:

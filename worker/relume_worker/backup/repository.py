@@ -57,7 +57,7 @@ class Snapshot:
     """A data directory at one moment.
 
     Attributes:
-        name: time, UTC. relume: version that made it. revision: of the ledger. ledger: its copy.
+        name: time, UTC. relume: version that made it. revision: revision of the ledger. ledger: copy of the ledger.
         left_out: one sentence for each file that is missing.
     """
 
@@ -125,7 +125,7 @@ class BackupRepository:
         """Store a content.
 
         Args:
-            source: file with the content. sha256: expected digest. report_bytes: for progress.
+            source: file with the content. sha256: expected digest. report_bytes: reports progress.
         Returns:
             True if the digest is correct; otherwise the file has changed or is damaged.
         """
@@ -193,8 +193,8 @@ def copy_verified(source: Path, target: Path, sha256: str, report_bytes: ReportB
     """Copy a file, which gets its name when it is complete.
 
     Args:
-        source: file to copy. target: in an existing folder.
-        sha256: expected digest. report_bytes: for progress.
+        source: file to copy. target: path in an existing folder.
+        sha256: expected digest. report_bytes: reports progress.
     Returns:
         True if the digest is correct; otherwise there is no copy.
     """

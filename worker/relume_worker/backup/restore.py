@@ -39,12 +39,12 @@ def restore(
     start_report: StartReport = lambda total: lambda done: None,
 ) -> tuple[Snapshot, Sequence[str]]:
     """Restore a snapshot, verifying every file. An object with damaged files is skipped, so that one bake does not cost
-    all others; the ledger's entry leads to baking it again.
+    all others; the bake's row in the ledger remains, so that it is baked again.
 
     Args:
-        repository: the backup folder. name: of the snapshot; None: the newest.
-        data_dir: empty, missing, or with the same restore interrupted. ledger_url: of an empty ledger.
-        start_report: for progress.
+        repository: the backup folder. name: name of the snapshot; None: the newest.
+        data_dir: empty, missing, or with the same restore interrupted. ledger_url: URL of an empty ledger.
+        start_report: starts a progress report.
     Returns:
         The snapshot, and one sentence for each object that is damaged in the backup.
     Raises:
@@ -115,7 +115,7 @@ def _delete(path: Path) -> None:
 def _restore_file(
     repository: BackupRepository, stored_file: StoredFile, target: Path, report_bytes: ReportBytes
 ) -> bool:
-    """Restore a file; true if it is there with the expected content."""
+    """Restore a file; true if it now exists with the expected content."""
     if target.exists() and target.stat().st_size == stored_file.num_bytes:  # complete, from before an interruption
         report_bytes(stored_file.num_bytes)
         return True

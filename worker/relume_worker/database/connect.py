@@ -11,7 +11,7 @@ from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 from relume_worker.database.failures import translate_error, watch
 from relume_worker.database.postgresql import TLS_MODES, connect_postgresql
 from relume_worker.database.upgrading import upgrade
@@ -27,7 +27,7 @@ def open_database(url: str) -> Engine:
 
     Raises:
         ParameterError: `url` is neither SQLite nor PostgreSQL.
-        DatabaseDamagedError, DiskFullError: from the file. LedgerVersionError: see `upgrading`.
+        DatabaseDamagedError, DiskFullError: the file cannot be used. LedgerVersionError: see `upgrading`.
     """
     engine = connect(url)
     try:
@@ -62,15 +62,18 @@ def _parse(url: str) -> URL:
     try:
         database_url = make_url(url)
     except ArgumentError:
-        raise ParameterError("RELUME_DATABASE", "something else", allowed) from None  # it may contain a password
+        raise ParameterError(
+            "RELUME_DATABASE", Description("not a URL"), allowed
+        ) from None  # it may contain a password
     if database_url.drivername == "sqlite":
         return database_url
     if database_url.drivername not in ("postgres", "postgresql", "postgresql+pg8000"):
         raise ParameterError("RELUME_DATABASE", database_url.drivername, allowed)
     if not (database_url.username and database_url.host):
-        raise ParameterError("RELUME_DATABASE", "a URL without user or host", allowed)
+        raise ParameterError("RELUME_DATABASE", Description("a URL without user or host"), allowed)
     if not (database_url.query.keys() <= {"sslmode"} and database_url.query.get("sslmode", TLS_MODES[0]) in TLS_MODES):
-        raise ParameterError("RELUME_DATABASE", "other options after ?", f"sslmode={', '.join(TLS_MODES)}, or none")
+        value, options = Description("a URL with unknown options after ?"), f"sslmode={', '.join(TLS_MODES)}"
+        raise ParameterError("RELUME_DATABASE", value, f"no options, or one of {options}")
     return database_url.set(drivername="postgresql+pg8000")
 
 

@@ -80,7 +80,7 @@ class DatabaseError:
     An unavailable database server is logged by `database_outage`, once for the whole process.
 
     Args:
-        log: to write to. label: start of the message, such as "x cannot be read".
+        log: log to write to. label: start of the message, such as "x cannot be read".
     """
 
     def __init__(self, log: logging.Logger, label: str) -> None:
@@ -113,7 +113,7 @@ class Outage:
     Calls overlap: a slow call that began before the last change is ignored.
 
     Args:
-        log: to write to. label: of the server.
+        log: log to write to. label: label of the server.
     """
 
     def __init__(self, log: logging.Logger, label: str) -> None:

@@ -48,8 +48,8 @@ class BakeRow(Base):
     Attributes:
         code: code version that makes or made it; None in rows of older versions.
         client: first user who submitted it; None in rows of older versions.
-        run: of its unfinished store, see `relume_worker.run_marker`; None in rows of older versions.
-        crowding: see `relume_worker.estimate`; None if it is not ready, or older than this measurement.
+        run: run marker of its unfinished store, see `relume_worker.run_marker`; None in rows of older versions.
+        crowding: see `relume_worker.estimate`; None if the bake is not ready, or older than this field.
     """
 
     __tablename__ = "bakes"
@@ -74,6 +74,35 @@ class BakeRow(Base):
     problem: Mapped[str | None] = mapped_column(Text, default=None)
     owner: Mapped[str | None] = mapped_column(default=None)
     heartbeat: Mapped[float] = mapped_column(default=0.0)
+
+
+class JobRow(Base):
+    """A render, comparison or BTF job, see `relume_worker.jobs`. `request` is the body of the call as JSON.
+
+    The service that runs it has the lease: `owner`, renewed by `heartbeat` (seconds by the database's clock).
+
+    Attributes:
+        kind: name of its `JobKind`.
+        done: finished steps.
+        client: who submitted it; null in rows of older versions. is_first: somebody waits for it.
+        created, started, ended: seconds since 1970; None: not yet, or in a row of an older version.
+    """
+
+    __tablename__ = "jobs"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    kind: Mapped[str] = mapped_column(index=True)
+    request: Mapped[str] = mapped_column(Text)
+    state: Mapped[str] = mapped_column(index=True)
+    done: Mapped[int] = mapped_column(default=0)
+    problem: Mapped[str | None] = mapped_column(Text, default=None)
+    created: Mapped[float]
+    client: Mapped[str | None] = mapped_column(default=None)
+    is_first: Mapped[bool | None] = mapped_column(default=None)
+    owner: Mapped[str | None] = mapped_column(default=None)
+    heartbeat: Mapped[float | None] = mapped_column(default=None)
+    started: Mapped[float | None] = mapped_column(default=None)
+    ended: Mapped[float | None] = mapped_column(default=None)
 
 
 class TaskRow(Base):

@@ -23,7 +23,7 @@ def with_retry(
 
     Args:
         gives_up: true to stop waiting; then the error propagates, as all other errors do at once.
-        call: may run twice. args, kwargs: of the call.
+        call: may run twice. args, kwargs: arguments and keyword arguments of the call.
     """
     while True:
         try:

@@ -43,7 +43,7 @@ def upgrade(engine: Engine, *, is_requested: bool) -> list[RevisionNote]:
     """Apply all missing revisions in one transaction; of several processes one applies them.
 
     Args:
-        engine: of the database.
+        engine: engine of the database.
         is_requested: whether a user asked for it, so that no older version is running; otherwise only additive
             revisions.
     Returns:
@@ -71,7 +71,7 @@ def draft_revision(connection: Connection, metadata: object, message: str) -> Pa
     """Write a draft of the revision that changes a database into the code's tables.
 
     Args:
-        connection: to a database of the newest revision. metadata: of the code's tables.
+        connection: connection to a database of the newest revision. metadata: metadata of the code's tables.
         message: short description.
     Returns:
         The file.

@@ -54,7 +54,7 @@ def fetch_if_missing(path: Path) -> Path:
     """Fetch a scene's folder or a bake's store if it is only in the storage; if it is nowhere, the path does not exist.
 
     Args:
-        path: in the data directory.
+        path: path in the data directory.
     Returns:
         The same path.
     Raises:
@@ -78,7 +78,7 @@ def open_cached(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
     """Open a bake, fetched if it is only in the storage; it is locked while the returned object lives.
 
     Args:
-        path: of its store. open_store: opens it; raises if it does not exist.
+        path: path of its store. open_store: opens it; raises if it does not exist.
     """
     if get_storage() is None:
         return open_store(path)

@@ -27,8 +27,8 @@ class PartialUploads:
     An outage of the storage delays nothing: missing files are uploaded with the next task.
 
     Args:
-        staging: unfinished store. bake_id, run: of the store.
-        tasks: finished and uploaded ones.
+        staging: unfinished store. bake_id, run: bake and run marker of the store.
+        tasks: finished and uploaded tasks.
     """
 
     def __init__(self, staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> None:
@@ -58,7 +58,8 @@ def fetch_partial(staging: Path, bake_id: str, run: str, tasks: Collection[TaskN
     """Replace the unfinished store by a run's partial results, if the storage has all these tasks; true if it has.
 
     Args:
-        staging: unfinished store. bake_id, run: of the store. tasks: finished ones in the ledger.
+        staging: unfinished store. bake_id, run: bake and run marker of the store.
+        tasks: finished tasks in the ledger.
     Raises:
         StorageError: the storage does not answer.
     """

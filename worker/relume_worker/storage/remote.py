@@ -56,13 +56,13 @@ class ObjectStorage:
             self._store = from_url(url, **options)
         except (BaseError, ValueError, OSError) as error:
             reason = str(error).partition("\n")[0][:200]  # the library's own details follow
-            raise ParameterError("RELUME_STORAGE", url, f"one that works ({reason})") from None
+            raise ParameterError("RELUME_STORAGE", url, f"a URL that works ({reason})") from None
 
     def put(self, name: str, folder: Path, files: Sequence[str]) -> None:
         """Upload a folder under a name atomically; replaces an existing one.
 
         Args:
-            name: such as scenes/<id>. folder: with the files.
+            name: such as scenes/<id>. folder: folder with the files.
             files: paths in the folder.
         Raises:
             StorageError: the storage does not answer, or refuses.
@@ -92,7 +92,7 @@ class ObjectStorage:
         """Fetch a folder, verifying each file; files of an interrupted fetch are kept.
 
         Args:
-            name: of the uploaded folder. folder: to fetch into; created if missing.
+            name: name of the uploaded folder. folder: folder to fetch into; created if missing.
         Returns:
             True if there is one of that name.
         Raises:
@@ -109,7 +109,7 @@ class ObjectStorage:
         """Upload some files of a folder under a name, without an index.
 
         Args:
-            name: such as parts/<id>. folder: with the files. files: paths in the folder.
+            name: such as parts/<id>. folder: folder with the files. files: paths in the folder.
         Raises:
             StorageError: the storage does not answer, or refuses.
         """

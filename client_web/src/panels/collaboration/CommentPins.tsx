@@ -48,7 +48,7 @@ function NewPin({ screen, pin }: { screen: ImageCanvas; pin: CommentPin }) {
 
 export function CommentPins({ screen }: { screen: ImageCanvas }) {
   if (!commentsOpen.value) return null;
-  displayedFrames.value; // the canvas may have changed size
+  void displayedFrames.value; // the canvas may have changed size
   const { view } = screen.image;
   const visibleComments = shownComments.value.filter((comment) => comment.view === view && isCameraAtComment(comment));
   const pin = pendingPin.value;

@@ -34,7 +34,7 @@ export const activeComparison = signal<ActiveComparison | null>(null);
 /** The state that the comparison depends on, without the look's display settings. */
 export function comparedState(): string {
   const visibleLight = [pathOverride.value, soloLight.value];
-  views.value; // the camera has moved
+  void views.value; // the camera has moved
   const camera = [currentPose(), currentSize()];
   return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: activeViewName.value, light: visibleLight, camera });
 }
@@ -66,7 +66,7 @@ function trackComparison(): void {
 
 /** Continue with the comparison of a bake that was displayed before a reload. */
 export async function loadComparison(bakeId: string | null): Promise<void> {
-  const stored = loadFromTab<{ id: string; look: string }>(COMPARISON_KEY);
+  const stored = loadFromTab(COMPARISON_KEY) as { id: string; look: string } | null;
   const body = stored === null ? null : await getComparison(stored.id).catch(() => null);
   trackComparison();
   if (stored === null || body === null || activeComparison.peek() !== null) return;

@@ -5,10 +5,12 @@ import { isBtfTerm } from "../../state/look";
 import { albedoMessage } from "./albedo";
 import { useServerQuery } from "./useServerQuery";
 
+const fetchAlbedo = (query: string) => getAlbedo(JSON.parse(query) as Term[]);
+
 export function AlbedoInfo({ terms }: { terms: readonly Term[] }) {
   const evaluated = terms.filter((term) => !isBtfTerm(term));
   const query = evaluated.length > 0 ? JSON.stringify(evaluated) : null;
-  const albedo = useServerQuery(query, (text) => getAlbedo(JSON.parse(text) as Term[]));
+  const albedo = useServerQuery(query, fetchAlbedo);
   const message = albedo && albedoMessage(albedo);
   if (!message) return null;
   return (

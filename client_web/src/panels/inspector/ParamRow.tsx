@@ -13,8 +13,8 @@ interface Props {
   info: ParameterBody;
   value: ParamValue;
   initial: ParamValue;
-  onChange(value: ParamValue): void;
-  onHold(): void;
+  onChange: (value: ParamValue) => void;
+  onHold: () => void;
 }
 
 function meanOf(value: ParamValue): number {

@@ -71,7 +71,7 @@ interface TextureProps {
   /** The material's textures. */
   channels: readonly string[];
   value: string | null;
-  onChange(value: string | null): void;
+  onChange: (value: string | null) => void;
 }
 
 /** Chooses the texture that multiplies the color. */

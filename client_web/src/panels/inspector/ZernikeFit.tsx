@@ -24,10 +24,12 @@ export function coverText(material: string): string | null {
   return sentences.length > 0 ? sentences.join(" ") : null;
 }
 
+const fetchFit = async (query: string) => (await getInOut([JSON.parse(query) as Term]))[0] ?? null;
+
 export function ZernikeFit({ term, material }: { term: Term; material: string }) {
   const isCover = isBtfTerm(term);
   const query = hasFreeCamera.value && !isCover ? JSON.stringify(term) : null;
-  const fit = useServerQuery(query, async (text) => (await getInOut([JSON.parse(text) as Term]))[0] ?? null);
+  const fit = useServerQuery(query, fetchFit);
   if (isCover) {
     const cover = coverText(material);
     return cover === null ? null : <p class="in-motion">{cover}</p>;

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 const AFTER_MS = 250; // one query per slider drag
 
 /** The response to `query`, or the previous one until then; null without a query or if it was rejected, which the
- * edit itself reports. */
+ * edit itself reports. `fetchAnswer` stays the same function: another one asks again. */
 export function useServerQuery<T>(query: string | null, fetchAnswer: (queryText: string) => Promise<T | null>): T | null {
   const [answer, setAnswer] = useState<T | null>(null);
   useEffect(() => {
@@ -20,6 +20,6 @@ export function useServerQuery<T>(query: string | null, fetchAnswer: (queryText:
       isOld = true;
       clearTimeout(timer);
     };
-  }, [query]);
+  }, [query, fetchAnswer]);
   return query === null ? null : answer;
 }

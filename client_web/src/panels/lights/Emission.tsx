@@ -1,6 +1,6 @@
 /** A light's emission: color as numbers and temperature, power in watts and lumens. */
 import { beginDrag } from "../../session/prepare";
-import type { Light, Rgb } from "../../protocol";
+import type { Light } from "../../protocol";
 import { defaultLook } from "../../state/look";
 import { ColorField } from "../../ui/ColorField";
 import { LabeledSlider } from "../../ui/LabeledSlider";
@@ -77,7 +77,7 @@ export function Emission({ name, light }: Props) {
         label="Emission"
         quantity
         value={light.emission}
-        initial={(defaultLook.value?.lights[name]?.emission as Rgb | undefined) ?? null}
+        initial={(defaultLook.value?.lights[name]?.emission) ?? null}
         onChange={(value) => editLight("Emission", name, "emission", value)}
       />
       <Temperature name={name} light={light} />

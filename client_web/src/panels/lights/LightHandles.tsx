@@ -75,7 +75,7 @@ interface HandleProps {
   position: Triple;
   label: "Move" | "Aim";
   /** The light's changes when the handle is dragged to a point. */
-  change(to: Triple): LightChange | null;
+  change: (to: Triple) => LightChange | null;
 }
 
 function LightHandle({ projection, name, light, position, label, change }: HandleProps) {
@@ -153,7 +153,7 @@ export function LightHandles({ screen }: { screen: ImageCanvas }) {
   const all = lights.value;
   const info = views.value.find(({ name }) => name === screen.image.view);
   if (!handlesOpen.value || info === undefined || Object.keys(all).length === 0) return null;
-  displayedFrames.value; // the canvas may have changed size
+  void displayedFrames.value; // the canvas may have changed size
   const projection = new HandleProjection(projectionCameraOf(info), screen);
   const { camera } = projection;
   const selected = selectedLight.value;

@@ -18,7 +18,7 @@ export interface NumbersField {
   maximum: number;
   step: number;
   /** True if a light may have these numbers; others are rejected. */
-  allows?(values: number[]): boolean;
+  allows?: (values: number[]) => boolean;
 }
 
 const XYZ = ["x", "y", "z"];
@@ -53,9 +53,9 @@ export interface AngleField {
   label: string;
   minimum: number;
   maximum: number;
-  valueOf(light: Light): number;
+  valueOf: (light: Light) => number;
   /** The field's value for an angle. */
-  changeFor(light: Light, angle: number): unknown;
+  changeFor: (light: Light, angle: number) => unknown;
 }
 
 const cone = (light: Light) => (light as Spot).cone;

@@ -112,5 +112,5 @@ export function completeLight(partial: Partial<Light>, base: Light | undefined):
 export function changeKind(light: Light, kind: AddedKind): Light {
   const start = DEFAULT_LIGHTS[kind];
   const shared = Object.entries(light).filter(([field]) => field !== "kind" && field in start);
-  return { ...start, ...Object.fromEntries(shared) } as Light;
+  return { ...start, ...Object.fromEntries(shared) };
 }

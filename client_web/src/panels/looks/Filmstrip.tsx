@@ -51,7 +51,7 @@ function showSaved(name: string, fullLook: Look): void {
 }
 
 function SavedTile({ saved }: { saved: SavedLook }) {
-  thumbnailRevision.value;
+  void thumbnailRevision.value;
   const fullLook = completeLook(saved.look);
   const isDisplayed = isDeepEqual(fullLook, look.value);
   return (
@@ -89,7 +89,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
 
 /** A variant from the scene's file: can be shown and compared, not changed. */
 function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }) {
-  thumbnailRevision.value;
+  void thumbnailRevision.value;
   const fullLook = completeLook(partial);
   const isDisplayed = isDeepEqual(fullLook, look.value);
   return (
@@ -168,7 +168,8 @@ function HistorySteps() {
   const strip = useRef<HTMLUListElement>(null);
   const steps = history.steps.value;
   const showCurrent = () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" });
-  useEffect(showCurrent, [history.cursor.value, steps.length]);
+  const cursor = history.cursor.value;
+  useEffect(showCurrent, [cursor, steps.length]);
   useEffect(() => {
     const observer = new ResizeObserver(showCurrent); // loading saved looks and variants shrinks the strip
     observer.observe(strip.current as Element);
@@ -193,7 +194,10 @@ function HistorySteps() {
 }
 
 export function Filmstrip() {
-  useEffect(() => void (scene.value !== null && refreshSavedLooks()), [scene.value?.id]);
+  const sceneId = scene.value?.id;
+  useEffect(() => {
+    if (sceneId !== undefined) void refreshSavedLooks();
+  }, [sceneId]);
   return (
     <section class="filmstrip" aria-label="Looks">
       <h2>Looks</h2>

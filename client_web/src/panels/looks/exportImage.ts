@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { freeCameraOf } from "../../viewport/cameras/freeCamera";
 import type { CameraPose } from "../../viewport/cameras/orbit";
-import { limitRenderSize } from "../../session/clientRendering";
+import { limitRenderSize } from "../../session/clientRenderer";
 import { untilToneMapReady } from "../../session/colorTransforms";
 import { untilExact } from "../../session/fidelityState";
 import { stage } from "../../render/renderStage";
@@ -26,7 +26,7 @@ const LONGEST_STEM = 120;
 export function fileStem(kind = "", space = ""): string {
   const limits = lightFilters.value.map((limit) => limit.label);
   const nameParts = [scene.value?.name ?? "picture", activeViewName.value, kind, ...limits, space].join(" ").trim();
-  return [...nameParts.replace(/[^\p{L}\p{N}._-]+/gu, "-")].slice(0, LONGEST_STEM).join("");
+  return Array.from(nameParts.replace(/[^\p{L}\p{N}._-]+/gu, "-")).slice(0, LONGEST_STEM).join("");
 }
 
 export async function exportPng(): Promise<void> {

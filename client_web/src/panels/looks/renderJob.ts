@@ -33,20 +33,21 @@ export function download(href: string, name: string): void {
 
 /** The job's final state; null if it was stopped. */
 async function finishRendering({ id, exportName }: ExportJob): Promise<RenderBody | null> {
-  let isStopped = false;
+  const stopping = new AbortController();
+  const isStopped = () => stopping.signal.aborted;
   const stop = () => {
-    isStopped = true;
+    stopping.abort();
     void reportErrors(() => deleteRender(id));
     clearExport();
   };
   for (;;) {
     const state = await nullIfUnavailable(getRender(id));
-    if (isStopped) return null;
+    if (isStopped()) return null;
     if (state?.state === "ready" || state?.state === "failed") return state;
     const { progress, seconds_left: secondsLeft } = state ?? { progress: exporting.peek()?.progress ?? 0, seconds_left: null };
     exporting.value = { exportName, progress, secondsLeft, stop };
     await new Promise((waited) => setTimeout(waited, POLL_MS));
-    if (isStopped) return null;
+    if (isStopped()) return null;
   }
 }
 
@@ -91,6 +92,6 @@ export async function renderAndSave(exportName: string, fetchFrom: string, reque
 
 /** Resume the job that was running before a reload. */
 export async function resumeRendering(): Promise<void> {
-  const stored = loadFromTab<ExportJob>(KEY);
+  const stored = loadFromTab(KEY) as ExportJob | null;
   if (stored !== null && exporting.peek() === null) await runExport(stored.exportName, () => pollRendering(stored));
 }

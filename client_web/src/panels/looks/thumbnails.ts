@@ -49,9 +49,9 @@ function takeThumbnail(current: Look): void {
 /** The look at the history's cursor, if its steps contain it. */
 function currentStep(): Look | null {
   const [steps, cursor] = [history.steps.value, history.cursor.value];
-  const isCurrentLook = (step: Step) => step.kind === "look";
-  const done = steps.slice(0, cursor).findLast(isCurrentLook) as LookStep | undefined;
-  return done?.after ?? (steps.slice(cursor).find(isCurrentLook) as LookStep | undefined)?.before ?? null;
+  const isCurrentLook = (step: Step): step is LookStep => step.kind === "look";
+  const done = steps.slice(0, cursor).findLast(isCurrentLook);
+  return done?.after ?? steps.slice(cursor).find(isCurrentLook)?.before ?? null;
 }
 
 const isStepLook = (candidate: Look) => history.steps.peek().some((step) => step.before === candidate || step.after === candidate);
@@ -78,7 +78,7 @@ export function trackThumbnails(): void {
     if (left !== null && left !== now && isStepLook(left)) untracked(() => takePreviousThumbnail(left));
   });
   effect(() => {
-    displayedFrames.value;
+    void displayedFrames.value;
     const current = look.value;
     clearTimeout(timer);
     if (current === null || (hasThumbnail(current) && !(isFrameExact.value && inexact.has(current)))) return;

@@ -53,8 +53,8 @@ async function requestBalls(): Promise<void> {
 /** Render balls from now on. */
 export function watchBalls(): () => void {
   return effect(() => {
-    scene.value;
-    look.value;
+    void scene.value;
+    void look.value;
     clearTimeout(timer);
     timer = setTimeout(() => void requestBalls(), IDLE_MS);
   });

@@ -160,7 +160,7 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
 
 /** Looks that can be added to the timeline, by the value of their option. */
 function lookChoices(): Map<string, { name: string; look: Partial<Look> }> {
-  const variants = (scene.value?.variants ?? []).map(({ name, look: namedLook }) => ({ name, look: namedLook as Partial<Look> }));
+  const variants = (scene.value?.variants ?? []).map(({ name, look: namedLook }) => ({ name, look: namedLook }));
   return new Map([...savedLooks.value, ...variants].map((partialLook, k) => [`${k}`, partialLook]));
 }
 

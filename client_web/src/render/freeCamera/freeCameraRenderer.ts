@@ -53,6 +53,13 @@ const FAR_PLANE = 100;
 /** Name of the sampler uniform of an array: uVisibleLights for visible_lights. */
 const uniform = (name: string) => `u${name.replace(/(^|_)(.)/g, (_, __, letter: string) => letter.toUpperCase())}`;
 
+/** The first byte of every pixel. */
+function firstOfFour(pixels: Uint8Array): Uint8Array {
+  const first = new Uint8Array(pixels.length / 4);
+  for (let index = 0; index < first.length; index++) first[index] = pixels[4 * index] as number;
+  return first;
+}
+
 export class FreeCameraRenderer {
   private readonly gl: WebGL2RenderingContext;
   private readonly texels: DataTextures;
@@ -121,7 +128,7 @@ export class FreeCameraRenderer {
   }
 
   /** Release the context: browsers limit their number. */
-  release(): void {
+  dispose(): void {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
@@ -182,7 +189,7 @@ export class FreeCameraRenderer {
     if (images.radiance !== null) this.encodeRadiance(images, images.radiance);
     const [encoded, hiding] = await readPixels(gl, images.encoded, hasAlpha ? 2 : 1, width, height);
     if (gl.isContextLost() || encoded === undefined) throw new Error("The graphics context was lost");
-    return { width, height, encoded, coverage: hiding?.filter((_, index) => index % 4 === 0) ?? null };
+    return { width, height, encoded, coverage: hiding === undefined ? null : firstOfFour(hiding) };
   }
 
   private drawProbes(camera: RenderCamera, numbers: Tables): void {

@@ -78,7 +78,7 @@ void finish(vec4 pixel) { outColor = vec4(min(pixel.rgb, 65000.0), pixel.a); }
 `;
 const finishGlsl = ({ direct, coverage }: ImageFeatures) => (direct ? encodeGlsl(coverage) : SAMPLES);
 
-/** Trilinear texture lookup, as `relume.live.free_camera.probes.texture_kernels`. */
+/** Trilinear texture lookup, as `relume.live.free_camera.texture_kernels`. */
 const TEXTURES = `
 uniform sampler2D uTexels, uUvs;
 uniform usampler2D uLevels;
@@ -143,7 +143,7 @@ function groupGlsl(number: number, quantity: string, { lobes, textures }: Materi
     ivec4 group = texelFetch(uMaterials, at(material + ${number}), 0);
     if (group.z > 0) {
       vec3 total = ratio * ${quantity};
-      ${lobes ? `${ADD_LOBE(albedo)}` : ""}
+      ${lobes ? ADD_LOBE(albedo) : ""}
       ${textures ? "if (group.w >= 0) total *= textureAt(group.w, uv, footprint);" : ""}
       color += max(total, 0.0);
     }

@@ -53,7 +53,7 @@ export class UnreachableError extends ApiError {
 
 /** A problem document as one sentence. */
 export function problemText(
-  problem: Problem | string | null | undefined,
+  problem: Partial<Problem> | string | null | undefined,
   fallback = "The server could not complete this request.",
 ): string {
   if (problem == null) return fallback;
@@ -63,7 +63,7 @@ export function problemText(
 
 async function errorFromResponse(response: Response): Promise<ApiError> {
   const fallback = `Server error ${response.status} ${response.statusText}.`;
-  const problem = (await response.json().catch(() => null)) as Problem | null;
+  const problem = (await response.json().catch(() => null)) as Partial<Problem> | null;
   const detail = typeof problem?.detail === "string" ? problem.detail : problem?.title;
   return new ApiError(detail ?? fallback, response.status);
 }

@@ -42,10 +42,11 @@ function validateArrays(tables: FrameHeader["scene_update"] | undefined, size: n
   let bytes = 0;
   for (const { dtype, shape } of tables.arrays) {
     const itemBytes = DTYPE_BYTES[dtype];
-    if (itemBytes === undefined || !isIntegerUpTo(shape?.[0], MAX_TEXELS) || ![1, 2, 4].includes(shape[1])) {
+    const [texels, components] = Array.isArray(shape) ? shape : [];
+    if (itemBytes === undefined || !isIntegerUpTo(texels, MAX_TEXELS) || ![1, 2, 4].includes(Number(components))) {
       throw new FrameError("a frame has an array of an unknown format");
     }
-    bytes += itemBytes * shape[0] * shape[1];
+    bytes += itemBytes * texels * Number(components);
   }
   if (bytes !== size) throw new FrameError("a frame's arrays do not match its bytes");
 }
@@ -83,7 +84,7 @@ export function parseFrame(buffer: ArrayBuffer): Frame {
   }
   if (header.format === "jpeg") return { header, payload: body, alpha: null };
   const perPixel = PIXEL_BYTES[header.format];
-  if (perPixel === undefined) throw new FrameError(`a frame has the unknown format ${String(header.format)}`);
+  if (perPixel === undefined) throw new FrameError(`a frame has the unknown format ${header.format}`);
   const pixels = header.tiles.reduce((sum, [, , w, h]) => sum + w * h, 0);
   const size = pixels * perPixel;
   if (size + (header.alpha ? pixels : 0) !== body.byteLength) {

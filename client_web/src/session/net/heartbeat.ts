@@ -9,13 +9,13 @@ const SILENCE_MS = 2000;
 const TIMEOUT_MS = 20_000;
 
 export interface HeartbeatHandlers {
-  sendPing(): void;
+  sendPing: () => void;
   /** No response for a while. */
-  onSilent(): void;
+  onSilent: () => void;
   /** A response after a reported silence. */
-  onAnswered(): void;
+  onAnswered: () => void;
   /** No response for so long that reconnecting is better. */
-  onLost(): void;
+  onLost: () => void;
 }
 
 export class Heartbeat {

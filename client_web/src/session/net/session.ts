@@ -28,26 +28,26 @@ const MAX_UNSHOWN_REVISIONS = 2;
 const MAX_WAIT_MS = 100;
 
 export interface SessionHandlers {
-  connection(state: Connection, retryInMs: number, reason?: string): void;
-  hello(message: HelloMessage): void;
+  connection: (state: Connection, retryInMs: number, reason?: string) => void;
+  hello: (message: HelloMessage) => void;
   /** Resolves when the frame is on the screen. */
-  frame(frame: Frame): Promise<void>;
-  status(message: StatusMessage): void;
-  problem(message: ProblemMessage, lastGood: Look | null): void;
-  inspect(message: InspectAnswer): void;
-  curve(message: CurveMessage): void;
-  bake(message: BakeMessage): void;
-  room(message: RoomMessage): void;
+  frame: (frame: Frame) => Promise<void>;
+  status: (message: StatusMessage) => void;
+  problem: (message: ProblemMessage, lastGood: Look | null) => void;
+  inspect: (message: InspectAnswer) => void;
+  curve: (message: CurveMessage) => void;
+  bake: (message: BakeMessage) => void;
+  room: (message: RoomMessage) => void;
   /** The scene's comments have changed. */
-  comments(): void;
+  comments: () => void;
   /** Other members have edited the look, which is now this one. */
-  roomUpdate(message: RoomUpdate, look: Look | null): void;
-  onEditSent(revision: number, inputTime: number): void;
+  roomUpdate: (message: RoomUpdate, look: Look | null) => void;
+  onEditSent: (revision: number, inputTime: number) => void;
   /** Editing was rejected: the session is read-only. */
-  readOnly(): void;
+  readOnly: () => void;
   /** The server rejects this session for good; reconnecting is useless. */
-  ended(reason: string, code: number): void;
-  invalidMessage(message: string): void;
+  ended: (reason: string, code: number) => void;
+  invalidMessage: (message: string) => void;
 }
 
 export class Session {
@@ -156,7 +156,7 @@ export class Session {
   }
 
   private onRoomUpdate(message: RoomUpdate): void {
-    const look = this.queue.applyRemote(message.patch as PatchOp[], message.revision);
+    const look = this.queue.applyRemote(message.patch, message.revision);
     if (this.readOnlyLook !== null) this.readOnlyLook = look;
     if (message.patch.length > 0) this.sharedRevision = message.room_revision;
     if (message.patch.length > 0) this.handlers.roomUpdate(message, look);

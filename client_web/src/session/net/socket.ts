@@ -20,10 +20,10 @@ export type OpenParameters = () => Readonly<Omit<OpenMessage, "type" | "resume">
 
 export interface SocketHandlers {
   /** `reason`: the server's message if it is full. */
-  connection(state: Connection, retryInMs: number, reason?: string): void;
-  received(data: string | ArrayBuffer): void;
+  connection: (state: Connection, retryInMs: number, reason?: string) => void;
+  received: (data: string | ArrayBuffer) => void;
   /** The server rejects this session for good; reconnecting is useless. */
-  ended(reason: string, code: number): void;
+  ended: (reason: string, code: number) => void;
 }
 
 export class SessionSocket {

@@ -24,20 +24,14 @@ function parseResponse(request: XMLHttpRequest): unknown {
 
 /** Upload a form; `progress` receives the sent fraction, 0…1. Throws ApiError with the server's message. */
 function postForm(path: string, form: FormData, progress: (fraction: number) => void): Promise<unknown> {
-  return new Promise((resolve, reject) => {
+  return new Promise<XMLHttpRequest>((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.upload.onprogress = (event) => progress(event.total > 0 ? event.loaded / event.total : 0);
-    request.onload = () => {
-      try {
-        resolve(parseResponse(request));
-      } catch (error) {
-        reject(error as Error);
-      }
-    };
+    request.onload = () => resolve(request);
     request.onerror = () => reject(new ApiError("Upload interrupted. Nothing was imported; try again.", 0));
     request.open("POST", path);
     request.send(form);
-  });
+  }).then(parseResponse);
 }
 
 export function uploadScene(upload: SceneUpload, progress: (fraction: number) => void): Promise<SceneBody> {

@@ -42,7 +42,7 @@ export function changeValue(look: Look, path: string, value: unknown): LookChang
       if (!Object.hasOwn(node, token)) node[token] = {};
       node = node[token] as DraftNode;
     }
-    if (value === undefined) delete node[lastToken];
+    if (value === undefined) Reflect.deleteProperty(node, lastToken);
     else node[lastToken] = value;
   });
 }

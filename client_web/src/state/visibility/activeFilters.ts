@@ -9,7 +9,7 @@ export interface ActiveFilter {
   label: string;
   /** Tooltip of the clear action. */
   title: string;
-  clear(): void;
+  clear: () => void;
 }
 
 function resetLightPaths(): void {

@@ -1,5 +1,5 @@
 /** Options of a free camera: field of view, image size, and the cameras saved with the scene. */
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { MAX_CAMERA_PIXELS, type CameraEntry } from "../../protocol";
 import { activeView } from "../../state/views";
 import { IconButton } from "../../ui/IconButton";
@@ -44,9 +44,9 @@ interface ListProps {
 
 function CameraList({ scene, freeCamera, name }: ListProps) {
   const [cameras, setCameras] = useState<CameraEntry[]>([]);
-  const read = async () => setCameras(await listCameras(scene));
+  const read = useCallback(async () => setCameras(await listCameras(scene)), [scene]);
   const run = (work: () => Promise<void>) => void reportErrors(work).then(() => reportErrors(read));
-  useEffect(() => void reportErrors(read), [scene]);
+  useEffect(() => void reportErrors(read), [read]);
   const save = () => run(() => saveCameraAs(scene, nextCameraName(cameras.map((camera) => camera.name)), freeCamera.pose, null));
   const remove = (camera: CameraEntry) => run(() => removeCamera(scene, camera, () => void reportErrors(read)));
   return (
@@ -82,7 +82,7 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
   const [open, setOpen] = useState(false);
   const menu = useRef<HTMLDivElement>(null);
   useDismiss(open, menu, () => setOpen(false));
-  activeView.value; // re-render when the camera moves
+  void activeView.value; // re-render when the camera moves
   const escape = (event: KeyboardEvent) => event.key === "Escape" && setOpen(false);
   return (
     <div class="menu" ref={menu} onKeyDown={escape}>

@@ -22,8 +22,8 @@ interface Props {
   from: CameraPose | null;
   /** The camera being moved, and maybe renamed; null: a new one. */
   name: string | null;
-  onSave(name: string): void;
-  onClose(): void;
+  onSave: (name: string) => void;
+  onClose: () => void;
 }
 
 interface PlacementStart {
@@ -49,8 +49,8 @@ export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {
   const [problem, setProblem] = useState("");
   useEffect(() => {
     dialog.current?.showModal();
-    startPlacement(scene.id, from).then(setStart, (error: Error) => setProblem(error.message));
-  }, [scene.id]);
+    startPlacement(scene.id, from).then(setStart, (error: unknown) => setProblem((error as Error).message));
+  }, [scene.id, from]);
   const title = name === null ? `New camera in “${scene.name}”` : `Move “${name}”`;
   return (
     <dialog class="placement" ref={dialog} aria-label={title} onClose={onClose} onKeyDown={(event) => event.stopPropagation()}>
@@ -93,7 +93,7 @@ function usePlacementCamera(scene: string, canvas: { current: HTMLCanvasElement 
       motion.end();
       images.close();
     };
-  }, [scene]);
+  }, [scene, canvas, first, fail]);
   const change = (update: (orbit: Orbit) => Orbit) => {
     const motion = pipeline.current?.motion;
     motion?.change(update);
@@ -105,7 +105,7 @@ function usePlacementCamera(scene: string, canvas: { current: HTMLCanvasElement 
 interface PlacementProps extends PlacementStart {
   scene: SceneBody;
   name: string | null;
-  onSave(name: string): void;
+  onSave: (name: string) => void;
 }
 
 function PlacementView({ scene, bounds, first, overview, name, onSave }: PlacementProps) {
@@ -138,7 +138,7 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
   };
   const control = useCameraControl(change, bounds, (u, v) => void lookAt(u, v));
   return (
-    <form onSubmit={save}>
+    <form onSubmit={(event) => void save(event)}>
       <canvas
         ref={canvas}
         width={IDLE_SIZE[0]}

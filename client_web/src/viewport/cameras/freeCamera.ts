@@ -1,7 +1,8 @@
 /** Free cameras of views: moved by the user, sent to the server, stored for a reload. */
 import { effect } from "@preact/signals";
-import { sendToShown } from "../../session/connections";
-import { renderIfPossible, limitRenderSize, isMoving, setMoving, setCameraSeq } from "../../session/clientRendering";
+import { connections, sendToShown } from "../../session/connections";
+import { limitRenderSize } from "../../session/clientRenderer";
+import { renderIfPossible, isMoving, setMoving } from "../../session/clientRendering";
 import { requestPixelProbe } from "../../session/pixelProbe";
 import type { HelloMessage, Triple } from "../../protocol";
 import { bake } from "../../state/bakes";
@@ -80,7 +81,7 @@ export class FreeCamera {
     const [width, height] = limitRenderSize(...this.size);
     const middle = requestPixelProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
     const position = await middle.then((answer) => answer.position, () => null);
-    if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position as Triple));
+    if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position));
   }
 
   /** Focus on a point. */
@@ -151,7 +152,7 @@ export class FreeCamera {
   private sendPose(camera: View["camera"], refine: "exact" | "none"): void {
     const { name } = this.view;
     this.number = Math.max(this.number + 1, Date.now());
-    setCameraSeq(name, this.number);
+    connections.shown?.cameraSeqs.set(name, this.number);
     sendToShown({ type: "camera", view: name, seq: this.number, ...camera, size: limitRenderSize(...this.size), active_control: null, refine });
   }
 
@@ -170,9 +171,9 @@ export class FreeCamera {
 
   private load(): StoredCamera {
     try {
-      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as Partial<StoredCamera>;
+      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as { orbit?: Orbit | null; size?: number[] | null };
       const isSize = Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
-      return { orbit: orbit && isClose(orbit, orbit) ? orbit : null, size: isSize ? size : null };
+      return { orbit: orbit && isClose(orbit, orbit) ? orbit : null, size: isSize ? (size as StoredCamera["size"]) : null };
     } catch {
       return { orbit: null, size: null };
     }

@@ -1,4 +1,4 @@
-"""Update strategies of a term's image, from a cached image to shading anew; one a file.
+"""Strategies that bring a term's image to its target, from a cached image to shading anew; one a file.
 
-Read first: `base`.
+Read first: `strategy`, then the table in `table`.
 """

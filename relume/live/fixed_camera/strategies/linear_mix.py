@@ -9,16 +9,21 @@ soloed light needs no other source.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.live.fixed_camera.displayed import UNIT_ROUNDOFF, DisplayedImage, norm_of
+from relume.live.fixed_camera.displayed import UNIT_ROUNDOFF, DisplayedImage, norm_of, weighted_sum
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, element_gain_changes, element_gains, equal_up_to_gains
-from relume.live.fixed_camera.jobs import Job, Resum, Shade, TermTarget, weighted_sum
+from relume.live.fixed_camera.jobs import Job
+from relume.live.fixed_camera.strategies.resum import resum_job
+from relume.live.fixed_camera.strategies.shading import Shading
+from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency, smallest_material
+from relume.live.fixed_camera.view_images import TermTarget
 from relume.look.model import Rgb
 
 F32 = NDArray[np.float32]
@@ -45,71 +50,82 @@ class _Recipe:
         return len({(element.environment_gain, element.local) for element in self.missing})
 
 
-class LinearMix:
-    """A `LightStrategy` for changes of gains without moved lights."""
+def is_applicable(target: TermTarget, light: Illumination) -> bool:
+    """Return whether only gains have changed since the reference image, and few images of sources are missing."""
+    return target.live.needs_only_light() and _recipe(target, light) is not None
 
-    fidelity = Fidelity.EXACT
 
-    def applicable(self, target: TermTarget, light: Illumination) -> bool:
-        """See `LightStrategy`."""
-        return self._recipe(target, light) is not None
+def _is_ready(target: TermTarget, light: Illumination) -> bool:
+    recipe = _recipe(target, light) if target.live.needs_only_light() else None
+    return recipe is not None and not recipe.missing
 
-    def prepare(self, target: TermTarget, light: Illumination) -> Sequence[Job]:
-        """See `LightStrategy`."""
-        recipe = self._recipe(target, light)
-        return [] if recipe is None else [Shade.for_target(target, element) for element in recipe.missing]
 
-    def evaluate(self, target: TermTarget, light: Illumination) -> None:
-        """See `LightStrategy`."""
-        live = target.live
-        recipe, reference = self._recipe(target, light), live.ready.reference
-        if recipe is None or recipe.missing or reference is None:
-            return
-        weighted_images = _weighted_images(target, recipe.gains)
-        if not recipe.from_reference:
-            mixed = weighted_sum(np.zeros_like(reference.image), weighted_images)
-            live.set_ready(DisplayedImage(mixed, Fidelity.EXACT, dict(live.target_bands), light))
-            return
-        mixed = weighted_sum(reference.image.copy(), weighted_images)
-        mixing_error = UNIT_ROUNDOFF * len(weighted_images) ** 0.5 * (norm_of(reference.image) + norm_of(mixed))
-        rounding = float(np.hypot(reference.rounding, mixing_error))
-        live.set_ready(
-            DisplayedImage(
-                mixed, reference.fidelity, dict(live.target_bands), light, rounding=rounding
-            ).downgrade_if_inexact()
-        )
+def _update(target: TermTarget, light: Illumination, max_coefficients: int | None) -> None:
+    live = target.live
+    recipe, reference = _recipe(target, light), live.ready.reference
+    if recipe is None or recipe.missing or reference is None:
+        return
+    weighted_images = _weighted_images(target, recipe.gains)
+    if not recipe.from_reference:
+        mixed = weighted_sum(np.zeros_like(reference.image), weighted_images)
+        live.set_ready(DisplayedImage(mixed, Fidelity.EXACT, dict(live.target_bands), light))
+        return
+    mixed = weighted_sum(reference.image.copy(), weighted_images)
+    mixing_error = UNIT_ROUNDOFF * len(weighted_images) ** 0.5 * (norm_of(reference.image) + norm_of(mixed))
+    rounding = float(np.hypot(reference.rounding, mixing_error))
+    live.set_ready(
+        DisplayedImage(
+            mixed, reference.fidelity, dict(live.target_bands), light, rounding=rounding
+        ).downgrade_if_inexact()
+    )
 
-    def resum_job(self, target: TermTarget) -> Resum | None:
-        """Return the job that sums a mixed image once from all its sources; None if images of sources are missing."""
+
+def _source_job(situation: Situation) -> Job | None:
+    """Return the job for a missing image of a light element, of the material with the fewest samples first."""
+    light = situation.images.light
+
+    def job(target: TermTarget) -> Job | None:
+        recipe = _recipe(target, light)
+        return None if recipe is None or not recipe.missing else Shading.for_target(target, recipe.missing[0]).job()
+
+    return smallest_material((target, job(target)) for target in situation.targets if target.live.needs_only_light())
+
+
+def _resum_job(situation: Situation) -> Job | None:
+    """Return the job that sums a mixed image once from all its sources; None if images of sources are missing."""
+    for target in situation.targets:
         live, gains = target.live, element_gains(target.live.light)
-        if self._make_recipe(target, False, gains).missing:
-            return None
-        key = (*target.images.image_key(target.material, live, live.light), "settled")
-        weighted_images = _weighted_images(target, gains)
-        return Resum(target, key, live.ready, lambda image: weighted_sum(image, weighted_images))
+        is_mixed = live.is_converged and live.ready.basis is None and live.ready.rounding > 0
+        if is_mixed and not live.changed_curves() and not _make_recipe(target, False, gains).missing:
+            weighted_images = _weighted_images(target, gains)
+            key = target.images.image_key(target.material, live, live.light)
+            return resum_job(target, key, partial(weighted_sum, weighted_images=weighted_images))
+    return None
 
-    def _recipe(self, target: TermTarget, light: Illumination) -> _Recipe | None:
-        """Return how the term's image is mixed; None if more than gains has changed, or too many images are missing."""
-        reference = target.live.ready.reference
-        if reference is None or reference.light is None or not equal_up_to_gains(reference.light, light):
-            return None
-        change = self._make_recipe(target, True, element_gain_changes(reference.light, light))
-        if not change.missing:
-            return change
-        whole = self._make_recipe(target, False, element_gains(light))
-        best = min(change, whole, key=lambda recipe: recipe.num_missing_sources)
-        return best if not best.missing or self._is_affordable(target, best) else None
 
-    @staticmethod
-    def _is_affordable(target: TermTarget, recipe: _Recipe) -> bool:
-        """Return whether the missing images are worth their cost and fit half of the memory budget."""
-        needed = 2 * len(recipe.gains) * target.images.image_bytes()
-        return recipe.num_missing_sources <= _MAX_MISSING_SOURCES and needed <= target.images.cache.budget_bytes
+def _recipe(target: TermTarget, light: Illumination) -> _Recipe | None:
+    """Return how the term's image is mixed; None if more than gains has changed, or too many images are missing."""
+    reference = target.live.ready.reference
+    if reference is None or reference.light is None or not equal_up_to_gains(reference.light, light):
+        return None
+    change = _make_recipe(target, True, element_gain_changes(reference.light, light))
+    if not change.missing:
+        return change
+    whole = _make_recipe(target, False, element_gains(light))
+    best = min(change, whole, key=lambda recipe: recipe.num_missing_sources)
+    return best if not best.missing or _is_affordable(target, best) else None
 
-    def _make_recipe(self, target: TermTarget, from_reference: bool, gains: Mapping[Illumination, Rgb]) -> _Recipe:
-        images, material, live = target
-        missing = tuple(element for element in gains if images.image_in(material, live, element) is None)
-        return _Recipe(from_reference, gains, missing)
+
+def _is_affordable(target: TermTarget, recipe: _Recipe) -> bool:
+    """Return whether the missing images are worth their cost and fit half of the memory budget."""
+    needed = 2 * len(recipe.gains) * target.images.image_bytes()
+    return recipe.num_missing_sources <= _MAX_MISSING_SOURCES and needed <= target.images.cache.budget_bytes
+
+
+def _make_recipe(target: TermTarget, from_reference: bool, gains: Mapping[Illumination, Rgb]) -> _Recipe:
+    images, material, live = target
+    missing = tuple(element for element in gains if images.image_in(material, live, element) is None)
+    return _Recipe(from_reference, gains, missing)
 
 
 def _weighted_images(target: TermTarget, gains: Mapping[Illumination, Rgb]) -> list[tuple[F32, Rgb]]:
@@ -117,3 +133,15 @@ def _weighted_images(target: TermTarget, gains: Mapping[Illumination, Rgb]) -> l
     images, material, live = target
     candidates = ((images.image_in(material, live, element), gain) for element, gain in gains.items())
     return [(shaded.image, gain) for shaded, gain in candidates if shaded is not None]
+
+
+LINEAR_MIX = Strategy(
+    name="linear mix",
+    needs="one image per light source",
+    cost="a sum of images",
+    fidelity=Fidelity.EXACT,
+    changes_light=True,
+    is_ready=_is_ready,
+    update=_update,
+    jobs={Urgency.LIGHT_SOURCE: _source_job, Urgency.REFINEMENT: _resum_job},
+)

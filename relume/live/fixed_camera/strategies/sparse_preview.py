@@ -9,9 +9,9 @@ ends, all samples are shaded. In large images finer previews come first, each wi
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,11 @@ from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, direct_only
-from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback, TermTarget
-from relume.live.fixed_camera.priority_region import with_samples
+from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.protocols import FixedViewTransfer, LightQuality, Samples
-from relume.live.fixed_camera.view_images import ViewImages
+from relume.live.fixed_camera.strategies import incremental_light
+from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
+from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look.model import Rgb
 from relume.operators.shade import ShadedTerm, shade
 from relume.operators.texel_light import collect_light, fits_budget, indirect_texel_light
@@ -105,23 +106,23 @@ def _subset_bytes(images: ViewImages, material: int) -> int:
     return int(rows.stop - rows.start) * (_NUM_NEIGHBORS * 12 + 8)
 
 
-def can_preview(images: ViewImages) -> bool:
+def _can_preview(images: ViewImages) -> bool:
     """Return whether the subsets fit half of the memory budget."""
     return 2 * sum(_subset_bytes(images, k) for k in range(len(images.by_name))) <= images.cache.budget_bytes
 
 
-def is_needed_for_first_frame(images: ViewImages) -> bool:
+def _is_needed_for_first_frame(images: ViewImages) -> bool:
     """Return whether a preview of a new picture is much faster than its missing images."""
     num_missing = sum(m.num_samples for m, image in images.terms() if not images.is_cached(m, image))
-    return num_missing > _MAX_SHADED_AT_ONCE and can_preview(images)
+    return num_missing > _MAX_SHADED_AT_ONCE and _can_preview(images)
 
 
-def should_refine(num_samples: int, detail: int) -> bool:
+def is_finer_worthwhile(num_samples: int, detail: int) -> bool:
     """Return whether shading takes so long that a preview of the next detail is worthwhile."""
     return num_samples > _MIN_FINER_RATIO * _num_shaded(detail + 1)
 
 
-def is_prepared(images: ViewImages) -> bool:
+def _is_prepared(images: ViewImages) -> bool:
     """Return whether the samples are selected; otherwise the first preview of a view takes a second more."""
     materials = {material.index for material, _ in images.terms()}
     return all(
@@ -138,46 +139,54 @@ class _TermSnapshot:
     bands: Mapping[str, NDArray[np.float64]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class SparsePreview:
     """Previews of terms in one light; the only strategy that reaches any light without a reference image.
 
     Attributes:
-        gain: of the finished image in that light.
+        gain: gain of the finished image in that light.
         detail: number of refinements.
     """
 
-    key: tuple[Hashable, ...]
     images: ViewImages
     light: Illumination
     gain: Rgb
     snapshots: Sequence[_TermSnapshot]
-    label: str = "the light"
     detail: int = 0
-    is_refinement: bool = False
-
-    state: Literal["precomputing", "shading"] = "shading"
-    is_resumable = False
 
     @classmethod
-    def for_targets(cls, images: ViewImages, targets: Iterable[TermTarget], label: str) -> SparsePreview:
-        """Return the preview of `targets` in the current look of `images`. label: text for the user."""
-        targets = list(targets)
+    def for_targets(
+        cls, images: ViewImages, targets: Iterable[TermTarget], light: Illumination, detail: int = 0
+    ) -> SparsePreview:
+        """Return the preview of terms, with their current curves.
+
+        Args:
+            images, targets: the terms. light: the illumination. detail: number of refinements.
+        """
         snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
-        image_keys = (images.image_key(target.material, target.live, images.light) for target in targets)
-        key = images.transfer.key, images.view.name, images.light, *image_keys
-        return cls(key, images, images.light, images.gain, snapshots, label)
+        return cls(images, light, images.gain, snapshots, detail)
 
-    def with_detail(self, detail: int, *, is_refinement: bool) -> SparsePreview:
-        """Return the same preview with more samples. is_refinement: it can wait for edits."""
-        return replace(self, key=(*self.key, detail), detail=detail, is_refinement=is_refinement)
+    def job(
+        self, label: str, on_preview: Callable[[Illumination, Rgb], None], priority: Priority = Priority.IMAGE
+    ) -> Job:
+        """Return the job.
 
-    def direct_only_first(self) -> SparsePreview:
-        """Return the same preview without indirect light, which takes seconds if it is not cached."""
-        return replace(self, key=(*self.key, "direct"), light=direct_only(self.light))
+        Args:
+            label: text for the user. on_preview: called with its light and gain when it is applied.
+            priority: when it starts.
+        """
+        images, targets = self.images, [snapshot.target for snapshot in self.snapshots]
+        image_keys = [images.image_key(target.material, target.live, images.light) for target in targets]
+        key = "preview", images.transfer.key, images.view.name, self.light, self.detail, *image_keys
+
+        def apply(previews: Sequence[F32]) -> None:
+            self.apply(previews)
+            on_preview(self.light, self.gain)
+
+        return Job(key, label, priority, self.run, apply)
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> list[F32]:
-        """See `Job`. Returns the images of all terms, (tiles, 3, samples) float32 each."""
+        """Return the images of all terms, (tiles, 3, samples) float32 each."""
         previews = []
         for k, snapshot in enumerate(self.snapshots):
             subset = _sample_subset(self.images, snapshot.target.material.index, self.light, self.detail)
@@ -198,9 +207,9 @@ class SparsePreview:
             btf_ref, collect_light(btf_ref, *incident, _ignore_progress, is_canceled), subset.weights, receivers
         ).image
 
-    def install(self, result: Sequence[F32]) -> None:
-        """See `Job`; used even if the light has changed further meanwhile."""
-        for snapshot, image in zip(self.snapshots, result, strict=True):
+    def apply(self, previews: Sequence[F32]) -> None:
+        """Use the images, even if the light has changed further meanwhile."""
+        for snapshot, image in zip(self.snapshots, previews, strict=True):
             live = snapshot.target.live
             is_incremental = live.ready.fidelity == Fidelity.INCREMENTAL and live.ready.light == live.light
             # with other fixed parameters it is still a preview
@@ -215,7 +224,7 @@ class SparsePreview:
         if ready.exact_region is None or ready.light != self.light:
             return replace(preview, exact_region=None, detail=self.detail)
         mask = material.lies_in(ready.exact_region[1])
-        merged = with_samples(image, ShadedTerm(ready.image).rows(len(mask)), mask)
+        merged = preview.with_samples(ShadedTerm(ready.image).rows(len(mask)), mask)
         return replace(preview, image=merged, detail=self.detail)
 
 
@@ -226,3 +235,40 @@ def _ignore_progress(fraction: float) -> None:
 def _interpolate(shaded: ShadedTerm, weights: Any) -> F32:
     """Interpolate an image of all samples from the shaded ones. (tiles, 3, samples) float32"""
     return ShadedTerm.from_rows(weights @ shaded.rows(weights.shape[1])).image
+
+
+def _preview_job(situation: Situation) -> Job | None:
+    """Return a preview if the target light differs or the picture opens, or to select samples before a rotation."""
+    images, light = situation.images, situation.images.light
+    if _needs_preview(situation):
+        missing = [target for target in situation.unconverged if not situation.can_reach(target)]
+        if situation.is_opening and light.paths.direct and light.paths.has_indirect:
+            light = direct_only(light)  # indirect light takes seconds if it is not cached
+        label = "a preview" if situation.is_opening else "the light"
+        return SparsePreview.for_targets(images, missing, light).job(label, situation.on_preview)
+    targets = situation.targets
+    outdated = [t for t in targets if t.live.displays_outdated and not images.is_cached(t.material, t.live)]
+    if outdated and situation.is_watched and _can_preview(images):
+        return SparsePreview.for_targets(images, outdated, light).job("what was changed", situation.on_preview)
+    if situation.control.rotates_environment and _can_preview(images) and not _is_prepared(images):
+        return SparsePreview.for_targets(images, targets, light).job("the light", situation.on_preview)
+    return None
+
+
+def _needs_preview(situation: Situation) -> bool:
+    images = situation.images
+    if situation.is_opening:
+        return situation.is_watched and _is_needed_for_first_frame(images)
+    if situation.displayed_light == images.light or not _can_preview(images):
+        return False
+    is_immediate = all(situation.can_reach(target) for target in situation.unconverged)
+    return not is_immediate and not (situation.control.edits_light and incremental_light.can_follow(situation))
+
+
+SPARSE_PREVIEW = Strategy(
+    name="sparse preview",
+    needs="a few thousand shaded samples",
+    cost="nothing; its job takes as long as a few frames",
+    fidelity=Fidelity.PREVIEW,
+    jobs={Urgency.PREVIEW: _preview_job},
+)

@@ -18,7 +18,6 @@ averaged over it and get one lobe.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import compress
@@ -29,6 +28,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import has_reflection_symmetry
 from relume.brdf.texture_slots import TEXTURES, texture_slot
@@ -42,8 +42,8 @@ from relume.live.free_camera.basis.outgoing_coefficients import (
     NUM_ROWS,
     OutgoingCoefficients,
     cosines,
+    untextured_white_term,
     white_coefficients,
-    white_term_key,
 )
 from relume.live.free_camera.basis.two_lobes import NUM_PARAMETERS, fit_two_lobes
 
@@ -128,12 +128,12 @@ def is_representable(terms: Sequence[Mapping[str, Any]]) -> bool:
 def _is_term_representable(term: Mapping[str, Any]) -> bool:
     coefficients = white_coefficients(term)
     return coefficients.residual_energy <= _REPRESENTABLE_RESIDUAL or not (
-        is_narrow(coefficients) or _needs_two_lobes(_fit_lobe(white_term_key(term))[:, 6:8])
+        is_narrow(coefficients) or _needs_two_lobes(_fit_lobe(untextured_white_term(term))[:, 6:8])
     )
 
 
 def _needs_two_lobes(sigma: F64) -> bool:
-    """Return whether one lobe would be a bad fit. sigma: of both. (rows, 2)"""
+    """Return whether one lobe would be a bad fit. sigma: sigma of both. (rows, 2)"""
     return bool((sigma.max(axis=1) > _MAX_WIDTH_RATIO * sigma.min(axis=1))[cosines() > _MIN_VIEW_COSINE].any())
 
 
@@ -150,7 +150,7 @@ def terms_in_lobe(coefficients: Sequence[OutgoingCoefficients]) -> list[bool]:
     """Select the terms of a material in its lobe: narrow ones; if there are none, those with a highlight.
 
     Args:
-        coefficients: of each term.
+        coefficients: coefficients of each term.
     """
     narrow = [is_narrow(term) for term in coefficients]
     return narrow if any(narrow) else [_has_highlight(term) for term in coefficients]
@@ -197,12 +197,12 @@ def build_lobes(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         grid_values = np.zeros((NUM_ROWS, NUM_GRID_DIRECTIONS))
         needs_grid = max_ratio[-1] == 1  # else the basis represents it
         for term in compress(terms, is_in_lobe):
-            lobe_parameters = _fit_lobe(white_term_key(term))
+            lobe_parameters = _fit_lobe(untextured_white_term(term))
             term_albedo = lobe_parameters[:, :3] * np.asarray(term["color"], np.float64)
             albedo_by_group[:, texture_slot(term)] += term_albedo
             weighted_parameters += term_albedo.mean(axis=1, keepdims=True) * lobe_parameters[:, 3:]
             if needs_grid:
-                grid_values += np.mean(term["color"]) * _grid_values(white_term_key(term))
+                grid_values += np.mean(term["color"]) * _grid_values(untextured_white_term(term))
         total = albedo_by_group.sum(axis=1).mean(axis=1)[:, None]
         albedo.append(albedo_by_group)
         shape_parameters.append(np.where(total > 0, weighted_parameters / np.maximum(total, 1e-30), 1))
@@ -243,7 +243,7 @@ class _IsotropicGrid(NamedTuple):
     Attributes:
         quadrature: for φo = 0. moment_weights: for it, see `_lobe_quadrature`.
         grid_quadrature, cosine: at grid directions of shapes, and cos θi there. (rows, directions) float32
-        x, z: of ωi. (rows, n) float32. area: solid angles. (n,) float32
+        x, z: x and z of ωi. (rows, n) float32. area: solid angles. (n,) float32
     """
 
     quadrature: Quadrature
@@ -269,7 +269,7 @@ def _lobe_quadrature(phi: float, num_azimuths: int) -> tuple[F64, F64, F64]:
     """Distribute directions around the mirror directions of view directions in all rows.
 
     Args:
-        phi: φo of the view directions. num_azimuths: of the directions around each.
+        phi: φo of the view directions. num_azimuths: number of azimuths of the directions around each.
     Returns:
         ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi, and times x and z (rows, n, 3). x points along the
         surface, away from the view direction; z = cos θi.
@@ -313,9 +313,9 @@ def _anisotropic_grid_values(document: Mapping[str, Any]) -> F64:
 
 
 @lru_cache(maxsize=_MAX_CACHED)
-def _fit_lobe(term_text: str) -> F64:
+def _fit_lobe(term: FrozenTerm) -> F64:
     """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R). (`NUM_ROWS`, 10)"""
-    document = json.loads(term_text)
+    document = term.document
     if not white_coefficients(document).is_isotropic:
         moments = _anisotropic_moments(document)
         mean, single_sigma = _single_lobe(moments)
@@ -331,9 +331,9 @@ def _fit_lobe(term_text: str) -> F64:
 
 
 @lru_cache(maxsize=_MAX_CACHED)
-def _grid_values(term_text: str) -> F64:
+def _grid_values(term: FrozenTerm) -> F64:
     """ρ cos θi at grid directions, mean over channels. (`NUM_ROWS`, `NUM_GRID_DIRECTIONS`)"""
-    document, grid = json.loads(term_text), _isotropic_grid()
+    document, grid = term.document, _isotropic_grid()
     if not white_coefficients(document).is_isotropic:
         return _anisotropic_grid_values(document)
     return np.asarray(grid.grid_quadrature.values(document).mean(axis=0) * grid.cosine)

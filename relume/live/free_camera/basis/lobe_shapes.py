@@ -126,7 +126,7 @@ def build_shapes(
     """Build the tables of highlights.
 
     Args:
-        grid_densities: of each, f cos θi / a at all grid directions. (rows, `NUM_GRID_DIRECTIONS`)
+        grid_densities: grid densities of each, f cos θi / a at all grid directions. (rows, `NUM_GRID_DIRECTIONS`)
         lobes: two lobes of each: cos θ of both, s_1, σ of both. (rows, 5)
         is_representable: the basis represents it, so it needs no table.
     """

@@ -8,7 +8,6 @@ alone, times cos mφ and sin mφ. Other terms have tables over θo and φo.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,10 +18,10 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import has_reflection_symmetry, is_isotropic
-from relume.live.free_camera.basis.table_symmetry import expand_quarter
-from relume.math.zernike import DEGREE, NUM_FUNCTIONS, num_functions, project, recurrence
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, basis_functions, num_functions, recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -79,7 +78,7 @@ def _disk_quadrature(is_half: bool) -> tuple[F64, F64, F64]:
         np.tile((np.arange(num_azimuths) + 0.5) * (2 * np.pi / _NUM_AZIMUTHS), _NUM_RADII),
     )
     wi = np.stack([np.sqrt(r2) * np.cos(phi), np.sqrt(r2) * np.sin(phi), np.sqrt(1 - r2)], axis=-1)
-    functions, recurrence_table = project(wi), recurrence()
+    functions, recurrence_table = basis_functions(wi), recurrence()
     if is_half:
         functions[:, recurrence_table.sine[recurrence_table.order > 0]] = 0
     return wi, np.repeat(weights / 4, num_azimuths) * (2 * np.pi / num_azimuths), functions
@@ -98,17 +97,17 @@ def outgoing_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficie
 
 def white_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficients:
     """Project a term without its color and texture."""
-    return _white_coefficients(white_term_key(term_document))
+    return _white_coefficients(untextured_white_term(term_document))
 
 
-def white_term_key(term_document: Mapping[str, Any]) -> str:
-    """Return a cache key of a term without its color and texture."""
-    return json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True)
+def untextured_white_term(term_document: Mapping[str, Any]) -> FrozenTerm:
+    """Return a term without its color and texture, by which results are cached."""
+    return FrozenTerm.from_document(term_document, color=_WHITE, texture=None)
 
 
 @lru_cache(maxsize=_MAX_CACHED)
-def _white_coefficients(term_text: str) -> OutgoingCoefficients:
-    document = json.loads(term_text)
+def _white_coefficients(term: FrozenTerm) -> OutgoingCoefficients:
+    document = term.document
     is_term_isotropic = is_isotropic(document)
     is_quarter = not is_term_isotropic and has_reflection_symmetry(document)
     num_columns = 1 if is_term_isotropic else NUM_COLUMNS // 4 + 1 if is_quarter else NUM_COLUMNS
@@ -122,7 +121,7 @@ def _white_coefficients(term_text: str) -> OutgoingCoefficients:
         else np.ones(num_columns)
     )
     by_degree = np.average(np.average(residual, weights=ends, axis=1), weights=cosines(), axis=0)
-    full_table = expand_quarter(table) if is_quarter else table
+    full_table = _expand_quarter(table) if is_quarter else table
     return OutgoingCoefficients(full_table.astype(np.float32), tuple(by_degree.tolist()))
 
 
@@ -164,3 +163,21 @@ def _project_anisotropic(document: Mapping[str, Any], phi: F64) -> tuple[F64, F6
         table[row] = value @ weighted_functions
         energy[row] = (value**2 @ weight).sum(axis=-1)
     return table, energy
+
+
+def _expand_quarter(quarter: Shaped[F64, "rows quarter_columns channels K"]) -> Shaped[F64, "rows columns channels K"]:
+    """Return the outgoing coefficients of a reflection-symmetric term for all φo from those of a quadrant.
+
+    Args:
+        quarter: for φo from 0 to π/2, both included.
+    Returns:
+        For φo from 0 to 2π, end excluded: four times as many columns less the repeated ones.
+    """
+    recurrence_table = recurrence()
+    across, along = np.ones((2, NUM_FUNCTIONS))  # signs of the functions under x → −x and y → −y
+    across[recurrence_table.cosine] = (-1.0) ** recurrence_table.order
+    odd = recurrence_table.order > 0
+    across[recurrence_table.sine[odd]] = -((-1.0) ** recurrence_table.order[odd])
+    along[recurrence_table.sine[odd]] = -1
+    half = np.concatenate([quarter, across * quarter[:, -2::-1]], axis=1)
+    return np.concatenate([half, along * half[:, -2:0:-1]], axis=1)

@@ -23,19 +23,21 @@ def table_row(cosine):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def view_direction_local(position, normal, tangent, camera_position):  # type: ignore[no-untyped-def]
-    """Return table coordinates of a point's ωo: a row, the fraction toward the next, and cos φo, sin φo.
-
-    Args:
-        position, normal, tangent: of the point. camera_position: of the camera.
-    """
-    x, y, z = camera_position[0] - position[0], camera_position[1] - position[1], camera_position[2] - position[2]
+def view_direction(viewed, p):  # type: ignore[no-untyped-def]
+    """Return ωo of a probe, a tuple. viewed: `ViewedProbes`. p: the probe."""
+    origin, position = viewed.camera_position, viewed.points.position
+    x, y, z = origin[0] - position[p, 0], origin[1] - position[p, 1], origin[2] - position[p, 2]
     scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
-    x, y, z = scale * x, scale * y, scale * z
-    n, t = normal, tangent
+    return scale * x, scale * y, scale * z
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def view_direction_local(viewed, p):  # type: ignore[no-untyped-def]
+    """Return table coordinates of a probe's ωo: a row, the fraction toward the next, and cos φo, sin φo."""
+    (x, y, z), n, t = view_direction(viewed, p), viewed.points.normal[p], viewed.points.tangent[p]
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     across, along = t[0] * x + t[1] * y + t[2] * z, bx * x + by * y + bz * z
-    cosine: Any = min(max(n[0] * x + n[1] * y + n[2] * z, MIN_COSINE), np.float32(1))
+    cosine = min(max(n[0] * x + n[1] * y + n[2] * z, MIN_COSINE), np.float32(1))
     length = math.sqrt(across * across + along * along)
     row, fraction = table_row(cosine)
     if length < np.float32(1e-6):

@@ -20,10 +20,10 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
     SIDE,
 )
 from relume.live.free_camera.normal_mapping import basis_gradients
-from relume.live.free_camera.probes.stored_scene import StoredScene, Textures
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid, num_nodes
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import NUM_FUNCTIONS, recurrence
+from relume.probes.stored_scene import StoredScene, Textures
+from relume.probes.triangle_grids import ProbeGrid, num_nodes
 
 Texels = NDArray[Any]
 
@@ -69,11 +69,13 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
     Returns:
         (texels, 1, 2 or 4) each, float32, float16 or uint32:
         corners: three corners of each face and its material. sides: two of each face, see `node_arrays`. facing: face
-        normals, `uv_scale`. positions: of corners. normals, points, weights: of slots. probe_positions, probe_normals,
-        tangents: of probes. visible_lights: visibility bits of each probe's lights, 128 a texel, needed only for lobes.
-        For scenes with textures also: texels; levels: of each texture (row of its first level, number of levels, both
-        wrap modes), then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the
-        bitangent, 0) and its tangent.
+        normals, `uv_scale`. positions: positions of corners.
+        normals, points, weights: normals, points and weights of slots. probe_positions, probe_normals,
+        tangents: tangents of probes.
+        visible_lights: visibility bits of each probe's lights, 128 a texel, needed only for lobes.
+        For scenes with textures also: texels; levels: levels of each texture (row of its first level, number of levels,
+        both wrap modes), then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of
+        the bitangent, 0) and its tangent.
     """
     stored_scene, probes = transfer.stored_scene, transfer.stored_scene.probes
     shader_nodes = node_arrays(stored_scene.probe_grid)
@@ -103,8 +105,8 @@ class NodeArrays(NamedTuple):
     meshes, share the slots of their corners.
 
     Attributes:
-        sides: of each side of a face; the last entry is the number of its rows. One row: the slots of its corners.
-            More:
+        sides: sides of each side of a face; the last entry is the number of its rows. One row: the slots of its
+            corners. More:
             its first slot, 0, 0. A side without nodes has those of the other side.
         lattice_node: lattice node of each slot.
     """

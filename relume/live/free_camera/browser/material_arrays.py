@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -11,17 +10,21 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.texture_slots import TEXTURES
 from relume.live.fixed_camera.illumination import material_emission
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
+from relume.live.free_camera.basis.lobe_shapes import NUM_AZIMUTHS, NUM_GRID_DIRECTIONS
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
 from relume.live.free_camera.browser.geometry_arrays import first_probes, overridden_texture_arrays
-from relume.live.free_camera.browser.highlight_arrays import environment_light_array, lobe_shape_array
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.frame import FrameRequestState, MaterialState
+from relume.live.free_camera.highlights.interpolated_highlights import NORMAL_VARIANCE_FACTOR
+from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, lobe_widths
-from relume.live.free_camera.probes.stored_scene import EMISSION, NORMAL_MAP
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.probes.stored_scene import EMISSION, NORMAL_MAP
 from relume.views.resolve import encode_pixels
 
 F32 = NDArray[np.float32]
@@ -31,6 +34,7 @@ _NUM_COARSE_FUNCTIONS = num_functions(FAST_DEGREE)  # nonzero functions of appro
 # possible numbers of functions; a shader is generated for each
 _FUNCTION_COUNTS = np.array([1, _NUM_COARSE_FUNCTIONS, NUM_FUNCTIONS])
 _MAX_RESIDUAL = 1e-3  # RMS of omitted functions, relative to the table's
+_MAX_HALF = 65504.0
 _MAX_SCALED = 2.0**14  # of coefficients: well inside half precision
 
 
@@ -66,7 +70,8 @@ def array_blocks(
     """Return the array blocks that a shader needs to show a look, by name.
 
     Args:
-        transfer: of the bake. state: of the frame. versions: of its materials, and of its incident coefficients.
+        transfer: transfer of the bake. state: state of the frame.
+        versions: versions of its materials, and of its incident coefficients.
     """
     look, light = state.look, state.light
     lobes, background = state.materials.lobes, look.background
@@ -150,8 +155,8 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
     )
     shapes = {
         f"shapes/{k}": ArrayBlock(
-            (json.dumps(projected[k].terms, sort_keys=True), float(normal_variation[k])),
-            partial(lobe_shape_array, lobes, k, normal_variation),
+            (tuple(map(FrozenTerm.from_document, projected[k].terms)), float(normal_variation[k])),
+            partial(_lobe_shape_array, lobes, k, normal_variation),
         )
         for k in np.flatnonzero(lobes.lobe_index >= 0).tolist()
         if lobes.max_ratio[lobes.lobe_index[k]] == 1
@@ -160,7 +165,7 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
         return {}
     lights = ArrayBlock(
         (environment, is_coarse),
-        lambda: environment_light_array(transfer.environment_lights(environment, is_preview=is_coarse)),
+        lambda: _environment_light_array(transfer.environment_lights(environment, is_preview=is_coarse)),
     )
     return {**shapes, "environment_lights": lights}
 
@@ -229,7 +234,7 @@ def needed_function_counts(
     all with a normal map.
 
     Args:
-        materials: of the look. has_map: materials with a normal map.
+        materials: materials of the look. has_map: materials with a normal map.
     Returns:
         For all light, and for light other than the environment, which highlights add separately.
     """
@@ -287,3 +292,37 @@ def _unoccluded(transfer: FreeCameraTransfer, state: FrameRequestState, catchers
 def _encode_rgb9e5(pixels: F32) -> NDArray[np.uint32]:
     """Radiance encoded as RGB9_E5. (n, 1) uint32"""
     return np.frombuffer(encode_pixels(np.ascontiguousarray(pixels), "rgb9e5"), np.uint32)[:, None]
+
+
+def _environment_light_array(lights: EnvironmentLights) -> dict[str, Texels]:
+    """Return the direction and width index of each light, then its irradiance.
+
+    Args:
+        lights: of the environment.
+    Returns:
+        (2 lights, 4) float32
+    """
+    width = (lights.table // NUM_GRID_DIRECTIONS).astype(np.float32)
+    directions, irradiance = np.split(lights.lights, 2, axis=1)
+    rows = np.column_stack([directions, width, irradiance, np.zeros_like(width)])
+    return {"environment_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
+
+
+def _lobe_shape_array(lobes: Lobes, material: int, normal_variation: Shaped[F32, " materials"]) -> dict[str, Texels]:
+    """Return the table of a material's highlight.
+
+    Args:
+        lobes: of all materials. material: one with a lobe. normal_variation: of all, see
+            `relume.live.free_camera.probes.stored_scene.StoredScene`.
+    Returns:
+        Of each row 1 − β, α², and the weight of the table for varying normals; then, for each width and ring, the
+        values at its first four azimuths, and at its last four. (rows · (1 + widths · rings · 2), 4) float16
+    """
+    lobe = int(lobes.lobe_index[material])
+    ring_values = lobes.shape[lobe].reshape(NUM_ROWS, -1, NUM_AZIMUTHS)
+    halves = np.stack([ring_values[..., :4], ring_values[..., -4:]], axis=2).reshape(NUM_ROWS, -1, 4)
+    sigma2, head = np.square(lobes.sigma[lobe].min(axis=1)), np.zeros((NUM_ROWS, 1, 4), np.float32)
+    head[:, 0, 0], head[:, 0, 1] = lobes.lobe_confidence[lobe], lobes.flatness[lobe]
+    head[:, 0, 2] = sigma2 / (sigma2 + NORMAL_VARIANCE_FACTOR * normal_variation[material])
+    texels = np.clip(np.concatenate([head, halves], axis=1), -_MAX_HALF, _MAX_HALF)
+    return {f"shapes/{material}": texels.astype(np.float16).reshape(-1, 4)}

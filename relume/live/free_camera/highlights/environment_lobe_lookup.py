@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -26,7 +26,7 @@ class PrefilteredEnvironment(NamedTuple):
         environment: its levels; blurred ones exclude bright lights.
         bright_lights: small bright regions: direction, world space, ∫ L dω, and 1 − |Σ ω L / Σ L|, the variance of
             their own width; at most `MAX_BRIGHT_LIGHTS`.
-        rotation: of the levels, from `rotation_of`. gain: per channel.
+        rotation: rotation of the levels, from `rotation_of`. gain: per channel.
     """
 
     environment: EnvironmentLookup
@@ -84,7 +84,7 @@ def evaluate_two_lobes(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
 def _lobe_frame(n, d):  # type: ignore[no-untyped-def]
     """Return the table row of θo, and the unit projection of d onto the surface."""
     facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
-    cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
+    cosine = min(max(facing, MIN_COSINE), np.float32(1))
     row, fraction = table_row(cosine)
     x, y, z = d[0] + facing * n[0], d[1] + facing * n[1], d[2] + facing * n[2]
     inverse_length = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
@@ -107,9 +107,10 @@ def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out
     """Add the environment in a lobe, without the environment's gain.
 
     Args:
-        environment: a `PrefilteredEnvironment`. visibility: of the environment without bright lights, and of each
+        environment: a `PrefilteredEnvironment`.
+        visibility: visibility of the environment without bright lights, and of each
             bright light, a tuple.
-        direction: of the lobe, a tuple. sigma: of the blur, radians. gain: a factor.
+        direction: direction of the lobe, a tuple. sigma: sigma of the blur, radians. gain: a factor.
         out: added to, radiance. (3,)
     """
     level = blur_level(sigma)

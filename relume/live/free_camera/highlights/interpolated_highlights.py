@@ -13,61 +13,55 @@ normals by more than the width of a lobe, only L_2 is used.
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import Lobes
+from relume.live.free_camera.basis.table_index import view_direction
 from relume.live.free_camera.highlights.environment_lobe_lookup import (
     PrefilteredEnvironment,
     add_environment_in_lobe,
     evaluate_lobe,
     evaluate_two_lobes,
 )
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_probes import ProbeRadiance
+from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
 
 NORMAL_VARIANCE_FACTOR = np.float32(4)  # a reflected direction turns twice as far as the normal
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_highlights(  # type: ignore[no-untyped-def]
-    probes,
-    material,
-    lobes,
-    environment,
-    camera_position,
-    lobe_visibility,
-    light_sums,
-    normal_variation,
-    is_fine,
-    rows,
-    start,
-    stop,
-    outgoing,
-    basis_radiance,
-):
-    """Add B − L to the radiance of probes rows[start:stop]. outgoing, basis_radiance: (probes, groups, 3)"""
-    position, normal, _, _, _ = probes
-    lobe_radiance, two_lobe_radiance = np.empty(3, np.float32), np.empty(3, np.float32)
-    for p in rows[start:stop]:
+class ProbeHighlights(NamedTuple):
+    """The environment's highlights at probes.
+
+    Attributes:
+        lobe_visibility: along lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
+        light_sums: from `relume.live.free_camera.highlights.light_sum_kernel`.
+    """
+
+    lobe_visibility: Shaped[F32, "probes 3"]
+    light_sums: Shaped[F32, "probes 3"]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _add_highlights(viewed, lobes, environment, highlights, normal_variation, is_fine, start, stop, scratch, outgoing):  # type: ignore[no-untyped-def]
+    """Add B − L to the radiance of probes rows[start:stop]. scratch: (2, 3). outgoing: `ProbeRadiance`"""
+    material, normal, (lobe_visibility, light_sums) = viewed.material, viewed.points.normal, highlights
+    (radiance, basis_radiance), lobe_radiance, two_lobe_radiance = outgoing, scratch[0], scratch[1]
+    for p in viewed.rows[start:stop]:
         lobe = lobes.lobe_index[material[p]]
         if lobe < 0:
             continue
         n = normal[p, 0], normal[p, 1], normal[p, 2]
-        x, y, z = (
-            position[p, 0] - camera_position[0],
-            position[p, 1] - camera_position[1],
-            position[p, 2] - camera_position[2],
-        )
-        scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
-        d = scale * x, scale * y, scale * z
+        x, y, z = view_direction(viewed, p)
+        d = -x, -y, -z
         visibility = lobe_visibility[p, 0], lobe_visibility[p, 1], lobe_visibility[p, 2]
         for channel in range(3):
             lobe_radiance[channel] = two_lobe_radiance[channel] = 0
@@ -93,7 +87,7 @@ def _add_highlights(  # type: ignore[no-untyped-def]
             two_lobe_radiance[channel] += normal_factor * (
                 light_sums[p, channel] - (np.float32(1) - confidence) * two_lobe_radiance[channel]
             )
-        for group in range(outgoing.shape[1]):
+        for group in range(radiance.shape[1]):
             for channel in range(3):
                 lower = lobes.albedo[lobe, row, group, channel]
                 albedo = environment.gain[channel] * (
@@ -101,17 +95,15 @@ def _add_highlights(  # type: ignore[no-untyped-def]
                 )
                 estimate = albedo * two_lobe_radiance[channel]
                 clamped = min(max(basis_radiance[p, group, channel], estimate / max_ratio), estimate * max_ratio)
-                outgoing[p, group, channel] += clamped - albedo * lobe_radiance[channel]
+                radiance[p, group, channel] += clamped - albedo * lobe_radiance[channel]
 
 
 def add_environment_highlights(
-    stored_scene: StoredScene,
+    viewed: ViewedProbes,
     lobes: Lobes,
     environment: PrefilteredEnvironment,
-    camera_position: Shaped[F32, " 3"],
-    lobe_visibility: Shaped[F32, "probes 3"],
-    light_sums: Shaped[F32, "probes 3"],
-    is_needed: Shaped[NDArray[np.uint8], " probes"],
+    highlights: ProbeHighlights,
+    normal_variation: Shaped[F32, " materials"],
     outgoing: ProbeRadiance,
     *,
     is_fine: bool,
@@ -119,18 +111,13 @@ def add_environment_highlights(
     """Add the probes' environment highlights, minus the lobes that pixels evaluate.
 
     Args:
-        stored_scene: the scene. lobes: of all materials. environment: prefiltered. camera_position: of the camera.
-        lobe_visibility: of the probes along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
-        light_sums: from `relume.live.free_camera.highlights.light_sum_kernel`.
-        is_needed: nonzero for probes to evaluate.
+        viewed: the probes to evaluate. lobes: of all materials. environment: prefiltered.
+        highlights: of all probes. normal_variation: of `StoredScene`.
         outgoing: its radiance is added to. is_fine: pixels evaluate two lobes, not one.
     """
-    rows = np.flatnonzero(is_needed.view(np.bool_))
-    probe_args = (
-        np.ascontiguousarray(camera_position, np.float32),
-        lobe_visibility,
-        light_sums,
-        stored_scene.normal_variation,
-    )
-    args = (stored_scene.probes, stored_scene.material, lobes, environment, *probe_args, is_fine, rows)
-    parallel_for_chunks(lambda start, stop: _add_highlights(*args, start, stop, *outgoing), len(rows))
+    args = viewed, lobes, environment, highlights, normal_variation, is_fine
+
+    def add(start: int, stop: int) -> None:
+        _add_highlights(*args, start, stop, np.empty((2, 3), np.float32), outgoing)
+
+    parallel_for_chunks(add, len(viewed.rows))

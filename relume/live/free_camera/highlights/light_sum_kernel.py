@@ -10,7 +10,7 @@ triangles count as one light if several are visible, with the mean direction and
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -27,7 +27,7 @@ from relume.live.free_camera.basis.lobe_shapes import (
     WIDTHS,
 )
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -45,7 +45,7 @@ class EnvironmentLights(NamedTuple):
     """The environment triangles, in groups: one light for each combination of visible triangles in a group.
 
     Attributes:
-        lights: of each combination the mean direction, unit, then Σ E per channel.
+        lights: lights of each combination the mean direction, unit, then Σ E per channel.
         table: start of the table of its width.
     """
 
@@ -59,8 +59,8 @@ class EnvironmentLights(NamedTuple):
         """Group successive lights.
 
         Args:
-            directions, irradiance: of each light, adjacent lights in succession.
-            radius: of a circle about each, radians.
+            directions, irradiance: directions and irradiance of each light, adjacent lights in succession.
+            radius: radius of a circle about each, radians.
         """
         num_rows = -(-len(directions) // LIGHTS_PER_GROUP) * LIGHTS_PER_GROUP
         rows = np.zeros((num_rows, 7))
@@ -80,9 +80,9 @@ class EnvironmentLights(NamedTuple):
 
 # One function: arrays passed to functions, even inlined ones, are reference-counted, for every probe.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, camera_position, rows, start, stop, out):  # type: ignore[no-untyped-def]
+def _sum_lights(viewed, visibility_bits, environment_lights, lobes, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the lights of probes rows[start:stop]. out: (probes, 3), written there"""
-    position, normal, _, _, _ = probes
+    (position, normal, _, _, _), material, camera_position, rows = viewed
     lights, table_start = environment_lights
     shape = lobes.shape.reshape(lobes.shape.shape[0], lobes.shape.shape[1], lobes.shape.shape[2] * NUM_GRID_DIRECTIONS)
     num_groups = lights.shape[0] >> LIGHTS_PER_GROUP
@@ -102,7 +102,7 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
         )
         inverse_length = np.float32(1) / math.sqrt(max(ox * ox + oy * oy + oz * oz, np.float32(1e-20)))
         ox, oy, oz = inverse_length * ox, inverse_length * oy, inverse_length * oz
-        facing: Any = min(max(nx * ox + ny * oy + nz * oz, MIN_COSINE), np.float32(1))
+        facing = min(max(nx * ox + ny * oy + nz * oz, MIN_COSINE), np.float32(1))
         row, fraction = table_row(facing)
         flatness, double = lobes.flatness[lobe], np.float32(2) * facing
         mx, my, mz = double * nx - ox, double * ny - oy, double * nz - oz
@@ -125,13 +125,13 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
         for k in range(num):
             lx, ly, lz = ring[k], azimuth[k], scale[k]
             mirror_cosine, cross_component = mx * lx + my * ly + mz * lz, ex * lx + ey * ly + ez * lz
-            squared_distance: Any = min(
+            squared_distance = min(
                 max(np.float32(2) - np.float32(2) * mirror_cosine, _MIN_SQUARED_DISTANCE), np.float32(4)
             )
             squared_sine = max(
                 squared_distance * (np.float32(1) - np.float32(0.25) * squared_distance), np.float32(1e-12)
             )
-            cosine: Any = min(max(cross_component / math.sqrt(squared_sine), np.float32(-1)), np.float32(1))
+            cosine = min(max(cross_component / math.sqrt(squared_sine), np.float32(-1)), np.float32(1))
             size = abs(cosine)
             arc = np.float32(-0.0187293) * size + np.float32(0.0742610)  # Abramowitz and Stegun 4.4.45, to 1e-4
             arc = (arc * size - np.float32(0.2121144)) * size + np.float32(1.5707288)
@@ -146,7 +146,7 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
         red = green = blue = np.float32(0)
         for k in range(num):
             light = visible_lights[k]
-            ring_coordinate: Any = min(np.float32(ring_bits[k] - LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
+            ring_coordinate = min(np.float32(ring_bits[k] - LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
             r, s = np.int32(ring_coordinate), np.int32(azimuth[k])
             fr, fs = ring_coordinate - np.float32(r), azimuth[k] - np.float32(s)
             at = table_start[light] + r * NUM_AZIMUTHS + s
@@ -165,32 +165,20 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
 
 
 def sum_lights(
-    stored_scene: StoredScene,
+    viewed: ViewedProbes,
     visibility_bits: Shaped[NDArray[np.uint8], "probes bytes"],
     lights: EnvironmentLights,
     lobes: Lobes,
-    camera_position: Shaped[F32, " 3"],
-    is_needed: Shaped[NDArray[np.uint8], " probes"],
 ) -> Shaped[F32, "probes 3"]:
     """Sum the visible lights in highlights of probes.
 
     Args:
-        stored_scene: the scene. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
-        lights: of the environment. lobes: of all materials. camera_position: of the camera.
-        is_needed: nonzero for probes to evaluate; the others get zero.
+        viewed: the probes to evaluate; the others get zero. lights: of the environment. lobes: of all materials.
+        visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
     Returns:
         Σ for unit albedo, without the fractions of lobes; zero if the basis represents the highlight.
     """
     sums = np.zeros((len(visibility_bits), 3), np.float32)
-    rows = np.flatnonzero(is_needed.view(np.bool_))
-    args = (
-        stored_scene.probes,
-        stored_scene.material,
-        visibility_bits,
-        lights,
-        lobes,
-        np.ascontiguousarray(camera_position, np.float32),
-        rows,
-    )
-    parallel_for_chunks(lambda start, stop: _sum_lights(*args, start, stop, sums), len(rows))
+    args = viewed, visibility_bits, lights, lobes
+    parallel_for_chunks(lambda start, stop: _sum_lights(*args, start, stop, sums), len(viewed.rows))
     return sums

@@ -26,9 +26,9 @@ from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import Lobes
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
-from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction_local
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction, view_direction_local
 from relume.math.zernike import recurrence
+from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -43,7 +43,7 @@ def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type:
     """Sum the tables and albedos of a material's terms with a highlight.
 
     Args:
-        tables, lobes: of all materials. material, row, channel: indices.
+        tables, lobes: tables and lobes of all materials. material, row, channel: indices.
         factors, step: written, w_k p_k in the row and the difference to the next. (entries,)
     Returns:
         The albedo in the row, and the difference to the next.
@@ -72,7 +72,8 @@ def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, ste
     """Sum the incident light of a probe with coefficients, and its derivatives.
 
     Args:
-        recurrence_table: of the basis. incident: t of the probe. (3, K). channel, factors, step: see `_sum_factors`.
+        recurrence_table: recurrence table of the basis. incident: t of the probe. (3, K).
+        channel, factors, step: see `_sum_factors`.
         view_coordinates: from `view_direction_local`.
     Returns:
         Σ_k w_k p_k t_k; its derivative per row; and per radian of φo.
@@ -96,14 +97,15 @@ def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, ste
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tables, lobes, material, factors, step):  # type: ignore[no-untyped-def]
+def _gradient(recurrence_table, frame, view_coordinates, non_environment, tables, lobes, material, scratch):  # type: ignore[no-untyped-def]
     """Return G of a probe, in world space.
 
     Args:
-        n, t, o: its normal, tangent and direction to the camera, unit, tuples. view_coordinates: from
+        frame: its normal, tangent and direction to the camera, unit, tuples. view_coordinates: from
             `view_direction_local`.
-        non_environment: t of it. (3, K). factors, step: scratch. (entries,)
+        non_environment: t of it. (3, K). scratch: (2, entries)
     """
+    (n, t, o), factors, step = frame, scratch[0], scratch[1]
     row, fraction, cosine_phi, sine_phi = view_coordinates
     facing = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
     cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
@@ -135,25 +137,10 @@ def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tabl
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _gradient_rows(  # type: ignore[no-untyped-def]
-    recurrence_table,
-    probes,
-    material,
-    non_environment,
-    tables,
-    lobes,
-    camera_position,
-    rows,
-    start,
-    stop,
-    factors,
-    step,
-    out,
-):
-    """Compute G and G · ω_p of probes rows[start:stop]. out: (probes, 4), written there"""
-    position, normal, tangent, _, _ = probes
-    for row_index in range(start, stop):
-        p = rows[row_index]
+def _gradients(recurrence_table, viewed, non_environment, tables, lobes, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Compute G and G · ω_p of probes rows[start:stop]. scratch: (2, entries). out: (probes, 4), written there"""
+    material, normal, tangent = viewed.material, viewed.points.normal, viewed.points.tangent
+    for p in viewed.rows[start:stop]:
         out[p, 0] = out[p, 1] = out[p, 2] = out[p, 3] = 0
         has_table = False
         for group in range(tables.table_index.shape[1]):
@@ -161,71 +148,37 @@ def _gradient_rows(  # type: ignore[no-untyped-def]
         if lobes.lobe_index[material[p]] < 0 or not has_table:
             continue
         n, t = (normal[p, 0], normal[p, 1], normal[p, 2]), (tangent[p, 0], tangent[p, 1], tangent[p, 2])
-        x, y, z = (
-            camera_position[0] - position[p, 0],
-            camera_position[1] - position[p, 1],
-            camera_position[2] - position[p, 2],
-        )
-        inverse_distance = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
-        o = inverse_distance * x, inverse_distance * y, inverse_distance * z
-        view_coordinates = view_direction_local(position[p], normal[p], tangent[p], camera_position)
+        o = view_direction(viewed, p)
         gx, gy, gz = _gradient(
-            recurrence_table, n, t, o, view_coordinates, non_environment[p], tables, lobes, material[p], factors, step
-        )
+            recurrence_table, (n, t, o), view_direction_local(viewed, p), non_environment[p], tables, lobes,
+            material[p], scratch,
+        )  # fmt: skip
         twice = np.float32(2) * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
         out[p, 0], out[p, 1], out[p, 2] = gx, gy, gz
         out[p, 3] = gx * (twice * n[0] - o[0]) + gy * (twice * n[1] - o[1]) + gz * (twice * n[2] - o[2])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _gradient_kernel(  # type: ignore[no-untyped-def]
-    recurrence_table, probes, material, non_environment, tables, lobes, camera_position, rows, start, stop, out
-):
-    """Allocate scratch arrays and call `_gradient_rows`."""
-    factors, step = (
-        np.empty(recurrence_table.order.shape[0], np.float32),
-        np.empty(recurrence_table.order.shape[0], np.float32),
-    )
-    _gradient_rows(
-        recurrence_table,
-        probes,
-        material,
-        non_environment,
-        tables,
-        lobes,
-        camera_position,
-        rows,
-        start,
-        stop,
-        factors,
-        step,
-        out,
-    )
-
-
 def gradients_along_lobe(
-    stored_scene: StoredScene,
+    viewed: ViewedProbes,
     non_environment: Shaped[F32, "probes 3 K"],
     tables: Tables,
     lobes: Lobes,
-    camera_position: Shaped[F32, " 3"],
-    is_needed: Shaped[NDArray[np.uint8], " probes"],
     out: Shaped[F32, "probes 4"] | None = None,
 ) -> Shaped[F32, "probes 4"]:
     """Return the gradients of other light in highlights with respect to the mirror direction.
 
     Args:
-        stored_scene: the scene. non_environment: t of all light except the environment's own.
+        viewed: the probes to evaluate. non_environment: t of all light except the environment's own, of all probes.
         tables: of all materials; anisotropic ones are ignored. lobes: of all materials.
-        camera_position: of the camera.
-        is_needed: nonzero for probes to evaluate.
         out: overwritten there; None: new, zero elsewhere.
     Returns:
         G in world space, and G · ω_p, radiance.
     """
     gradients = np.zeros((len(non_environment), 4), np.float32) if out is None else out
-    rows = np.flatnonzero(is_needed.view(np.bool_))
-    probe_args = recurrence(), stored_scene.probes, stored_scene.material, non_environment
-    args = *probe_args, tables, lobes, np.ascontiguousarray(camera_position, np.float32), rows
-    parallel_for_chunks(lambda start, stop: _gradient_kernel(*args, start, stop, gradients), len(rows))
+    args = recurrence(), viewed, non_environment, tables, lobes
+
+    def compute(start: int, stop: int) -> None:
+        _gradients(*args, start, stop, np.empty((2, len(args[0].order)), np.float32), gradients)
+
+    parallel_for_chunks(compute, len(viewed.rows))
     return gradients

@@ -43,7 +43,7 @@ class LobeLightLists(NamedTuple):
     """Environment lights, and lists of them per direction bin.
 
     Attributes:
-        lights: of each the direction, r², and E, luminance, without bright lights.
+        lights: lights of each the direction, r², and E, luminance, without bright lights.
         lists: lights of every width and bin; −1 after the last.
         first: list of the first bin of each width, or of the nearest width with lists.
         bright_lights: the lights that contribute most to each bright light, then −1.
@@ -107,7 +107,8 @@ def light_weight(lights, light, x, y, z, variance):  # type: ignore[no-untyped-d
     """Return w of a light.
 
     Args:
-        lights, light: of `LobeLightLists`, and an index. x, y, z: direction of the lobe, unit. variance: of the lobe,
+        lights, light: list of `LobeLightLists`, and an index. x, y, z: direction of the lobe, unit.
+        variance: variance of the lobe,
             σ².
     """
     one_minus_cosine = np.float32(1) - (x * lights[light, 0] + y * lights[light, 1] + z * lights[light, 2])
@@ -126,7 +127,9 @@ def _weight(one_minus_cosine, spread, luminance, variance):  # type: ignore[no-u
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _list_lights(columns, centers, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
-    """List the lights with the largest weight anywhere in bins [start, stop). columns: of the lights. (5, lights)"""
+    """List the lights with the largest weight anywhere in bins [start, stop). columns: columns of the lights. (5,
+    lights)
+    """
     num, max_listed = columns.shape[1], out.shape[1]
     weight = np.empty(num, np.float32)
     bits = weight.view(np.int32)  # the same order as nonnegative floats
@@ -156,7 +159,7 @@ def _selection_threshold(bits, max_count):  # type: ignore[no-untyped-def]
     Bisects its range: counting vectorizes, sorting does not.
 
     Args:
-        bits: of n nonnegative numbers. (n,) int32
+        bits: bits of n nonnegative numbers. (n,) int32
     Returns:
         Its bits, and how many equal numbers may be selected.
     """
@@ -193,10 +196,10 @@ def build_light_lists(
 
     Args:
         directions: unit, those of visibility bits.
-        radius: of a circle about each, radians.
+        radius: radius of a circle about each, radians.
         luminance: E of each without bright lights, luminance.
         bright_light_fractions: contribution of each light to each bright light.
-        widths: of lobes, from `lobe_widths`; ascending, at least one.
+        widths: widths of lobes, from `lobe_widths`; ascending, at least one.
     """
     lights = np.column_stack([directions, radius**2 / _RADIUS_TO_VARIANCE, luminance]).astype(np.float32)
     columns, (centers, farthest) = np.ascontiguousarray(lights.T), _DIRECTION_BINS

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import Lobes
+from relume.live.free_camera.basis.table_index import view_direction
 from relume.live.free_camera.highlights.environment_lobe_lookup import evaluate_two_lobes
 from relume.live.free_camera.highlights.lobe_light_lists import (
     MAX_BRIGHT_LIGHTS,
@@ -24,7 +25,7 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
     light_weight,
     width_index,
 )
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -48,26 +49,17 @@ def _mean_lobe(direction_1, direction_2, weight_1, sigma_1, sigma_2):  # type: i
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _trace_lobe_visibility(  # type: ignore[no-untyped-def]
-    probes, material, visibility_bits, lobe_lights, lobes, camera_position, rows, start, stop, out
-):
+def _trace_lobe_visibility(viewed, visibility_bits, lobe_lights, lobes, start, stop, out):  # type: ignore[no-untyped-def]
     """Evaluate lobe visibility of probes rows[start:stop]."""
-    position, normal, _, _, _ = probes
-    for p in rows[start:stop]:
+    material, normal = viewed.material, viewed.points.normal
+    for p in viewed.rows[start:stop]:
         lobe = lobes.lobe_index[material[p]]
         out[p] = 0
         if lobe < 0:
             continue
         n = normal[p, 0], normal[p, 1], normal[p, 2]
-        x, y, z = (
-            position[p, 0] - camera_position[0],
-            position[p, 1] - camera_position[1],
-            position[p, 2] - camera_position[2],
-        )
-        scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))
-        _, _, direction_1, direction_2, weight_1, sigma_1, sigma_2 = evaluate_two_lobes(
-            lobes, lobe, n, (scale * x, scale * y, scale * z)
-        )
+        x, y, z = view_direction(viewed, p)
+        _, _, direction_1, direction_2, weight_1, sigma_1, sigma_2 = evaluate_two_lobes(lobes, lobe, n, (-x, -y, -z))
         x, y, z, variance = _mean_lobe(direction_1, direction_2, weight_1, sigma_1, sigma_2)
         list_index = lobe_lights.first[width_index(math.sqrt(variance))] + bin_of(x, y, z)
         visible_weight, total_weight = np.float32(0), np.float32(1e-30)
@@ -92,34 +84,24 @@ def _trace_lobe_visibility(  # type: ignore[no-untyped-def]
 
 
 def trace_lobe_visibility(
-    stored_scene: StoredScene,
+    viewed: ViewedProbes,
     visibility_bits: Shaped[NDArray[np.uint8], "probes bytes"],
     lobe_lights: LobeLightLists,
     lobes: Lobes,
-    camera_position: Shaped[F32, " 3"],
-    is_needed: Shaped[NDArray[np.uint8], " probes"],
     out: Shaped[F32, "probes 3"] | None = None,
 ) -> Shaped[F32, "probes 3"]:
     """Return the visibility of the environment in lobes of probes.
 
     Args:
-        stored_scene: the scene. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
-        lobe_lights: of the environment. lobes: of all materials. camera_position: of the camera.
-        is_needed: nonzero for probes to evaluate.
+        viewed: the probes to evaluate. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
+        lobe_lights: of the environment. lobes: of all materials.
         out: overwritten there; None: new, zero elsewhere.
     Returns:
         V, the visible fraction of environment light in the lobe; then that of each bright light.
     """
     lobe_visibility = np.zeros((len(visibility_bits), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
-    rows = np.flatnonzero(is_needed.view(np.bool_))
-    args = (
-        stored_scene.probes,
-        stored_scene.material,
-        visibility_bits,
-        lobe_lights,
-        lobes,
-        np.ascontiguousarray(camera_position, np.float32),
-        rows,
+    args = viewed, visibility_bits, lobe_lights, lobes
+    parallel_for_chunks(
+        lambda start, stop: _trace_lobe_visibility(*args, start, stop, lobe_visibility), len(viewed.rows)
     )
-    parallel_for_chunks(lambda start, stop: _trace_lobe_visibility(*args, start, stop, lobe_visibility), len(rows))
     return lobe_visibility

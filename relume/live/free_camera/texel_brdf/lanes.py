@@ -6,7 +6,7 @@ As plain loops they take twice the time: see `relume.core.simd`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ def add_texels(typing_context, weight, step, view, view_weight, first_view, texe
         is_more: add to `out`, else overwrite it. out: (24,) float32
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         first_view, first, is_more = (arguments[k] for k in (4, 7, 8))
         weights, steps, views, view_weights, texels, texel_weights, sums = (
             ArrayPointer(context, builder, kind, value)
@@ -103,13 +103,14 @@ def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes
     Args:
         typing_context: Numba's. coefficients: (24,) float32. axes: color axes. (3, 3) float32
         secondary_axes: from `pack_secondary_axes`. vectors: light at nodes, in lanes. (nodes, 3 F) float32
-        nodes: three, a tuple of uint32. weights: of each, a tuple. rotations: cosine and sine of each, a tuple of six.
+        nodes: three, a tuple of uint32. weights: weights of each, a tuple.
+        rotations: cosine and sine of each, a tuple of six.
         side: −1 if azimuths run the other way, else 1.
     Returns:
         Radiance per channel, a tuple of float32.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         coefficients, axes, secondary_axes, vectors = (
             ArrayPointer(context, builder, kind, value)
             for kind, value in zip(signature.args[:4], arguments[:4], strict=True)
@@ -118,8 +119,8 @@ def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes
         corners = [builder.zext(builder.extract_value(nodes, k), WORD) for k in range(_CORNERS)]
         ones = ir.Constant(VECTOR, [1.0] * NUM)  # order 0 is not mirrored
         mirror = builder.select(_lane_mask(lambda order: order > 0), broadcast(builder, side), ones)
-        cosines: list[Any] = []
-        sines: list[Any] = []
+        cosines: list[ir.Value] = []
+        sines: list[ir.Value] = []
         for k in range(_CORNERS):
             weight = broadcast(builder, builder.extract_value(weights, k))
             rotation = (
@@ -176,12 +177,12 @@ def pack_secondary_axes(axes: Shaped[NDArray[np.float32], "3 3"]) -> Shaped[NDAr
     return np.ascontiguousarray(axes[:, COEFFICIENT_AXIS[2 * HALF :]])
 
 
-def _lane_mask(predicate: Callable[[int], bool]) -> Any:
+def _lane_mask(predicate: Callable[[int], bool]) -> ir.Value:
     """Mask of the lanes whose order satisfies a predicate."""
     return ir.Constant(ir.VectorType(ir.IntType(1), NUM), [int(predicate(order)) for order in _ORDERS])
 
 
-def _rotation_factors(builder: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:
+def _rotation_factors(builder: ir.IRBuilder, cosine: ir.Value, sine: ir.Value) -> tuple[ir.Value, ir.Value]:
     """Return cos mφ and sin mφ for each pair of lanes: Chebyshev's T_m(cos φ), and sin φ U_{m−1}(cos φ)."""
     cosine_polynomials = [_polynomial(chebyshev.cheb2poly(np.eye(order + 1)[order])) for order in _ORDERS]
     # m U_{m−1} is the derivative of T_m

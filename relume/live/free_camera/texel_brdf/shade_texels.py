@@ -10,23 +10,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.btf.direction_rings import interpolation_weights_at
+from relume.assets.btf.direction_rings import DirectionGrid, interpolation_weights_at
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.simd import prefetch
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import is_edge
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.texel_brdf.coefficient_packing import NUM_COEFFICIENTS
 from relume.live.free_camera.texel_brdf.lanes import add_texels, integrate, pack_secondary_axes
-from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial
+from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial, TexelTables
 from relume.live.free_camera.texel_brdf.texture_coordinates import (
     AZIMUTH,
     BATCH_SIZE,
@@ -44,7 +43,8 @@ from relume.live.free_camera.texel_brdf.texture_coordinates import (
     map_to_texture,
     vector_row,
 )
-from relume.live.free_camera.texel_brdf.texture_frame_light import NodeLight, TexelLight, rotation_from_vector
+from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight, rotation_from_vector
+from relume.probes.stored_scene import StoredScene
 from relume.transport.btf_kernel import texels_at_level
 
 F32 = NDArray[np.float32]
@@ -57,11 +57,11 @@ class TextureFootprint(NamedTuple):
     """Camera and G-buffer that texels are shaded for.
 
     Attributes:
-        camera_position: meters. pixel_angle: angle of a pixel, radians. gbuffer: of its rays.
+        camera_position: meters. pixel_angle: angle of a pixel, radians. gbuffer: G-buffer of its rays.
     """
 
     camera_position: Shaped[F32, " 3"]
-    pixel_angle: float
+    pixel_angle: float | np.float32
     gbuffer: GBuffer
 
 
@@ -74,6 +74,48 @@ class IncidentTexelLight(NamedTuple):
 
     vectors: Shaped[F32, "probes 3 functions"]
     light: TexelLight
+
+
+class _PlacedBtf(NamedTuple):
+    """A BTF on a material, for the kernel: see `BtfMaterial`. rotation: cosine and sine."""
+
+    direction_grid: DirectionGrid
+    tables: TexelTables
+    secondary_axes: F32
+    scale: np.float32
+    rotation: tuple[np.float32, np.float32]
+    color: Shaped[F32, " 3"]
+
+
+class _TexelScratch(NamedTuple):
+    """Scratch memory of a thread.
+
+    Attributes:
+        texel, texel_weight, view, view_weight: of one ray. texels, texel_weights, views, view_weights: of a batch of
+            rays: 8 texels and 4 view directions each. num_texels: of each ray.
+        columns: see `relume.live.free_camera.texel_brdf.texture_coordinates`. coefficients: of one ray.
+    """
+
+    texel: NDArray[np.int32]
+    texel_weight: F32
+    view: NDArray[np.int32]
+    view_weight: F32
+    texels: NDArray[np.int32]
+    texel_weights: F32
+    views: NDArray[np.int32]
+    view_weights: F32
+    num_texels: NDArray[np.int64]
+    columns: F32
+    coefficients: F32
+
+
+def _allocate_scratch() -> _TexelScratch:
+    n = BATCH_SIZE
+    return _TexelScratch(
+        np.empty(8, np.int32), np.empty(8, np.float32), np.empty(4, np.int32), np.empty(4, np.float32),
+        np.empty(8 * n, np.int32), np.empty(8 * n, np.float32), np.empty(4 * n, np.int32), np.empty(4 * n, np.float32),
+        np.empty(n, np.int64), np.zeros(NUM_COLUMNS * n, np.float32), np.empty(NUM_COEFFICIENTS, np.float32),
+    )  # fmt: skip
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -101,20 +143,18 @@ def _list_rays(face, face_material, has_btf, reuses_center, lattice_node, first,
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _subtract_center(  # type: ignore[no-untyped-def]
-    owner, num_pixels, has_btf, face_material, face_normal, face, distance, directions, reuses_center, out
-):
+def _subtract_center(gbuffer, num_pixels, has_btf, face_material, face_normal, reuses_center, out):  # type: ignore[no-untyped-def]
     """Find edge rays that hit the same surface as the pixel center, and subtract the center's radiance from theirs.
 
     Args:
-        owner: pixels of the rays. reuses_center: per ray, written. out: radiance by the mean texel, written. (rays, 3)
+        gbuffer: of the rays. reuses_center: per ray, written. out: radiance by the mean texel, written. (rays, 3)
     """
-    for k in range(owner.shape[0]):
-        ray, p = num_pixels + k, owner[k]
-        f = face[ray]
+    for k in range(gbuffer.owner.shape[0]):
+        ray, p = num_pixels + k, gbuffer.owner[k]
+        f = gbuffer.hits.face[ray]
         if f < 0 or not has_btf[face_material[f]]:
             continue
-        if not is_edge(face_material, face_normal, face, distance, directions, p, ray):
+        if not is_edge(face_material, face_normal, gbuffer.hits, gbuffer.directions, p, ray):
             reuses_center[ray] = 1
             for channel in range(3):
                 out[ray, channel] -= out[p, channel]
@@ -129,26 +169,19 @@ def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyp
                 out[num_pixels + k, channel] = max(out[num_pixels + k, channel] + out[owner[k], channel], F(0))
 
 
-# Helpers are inlined and take arrays, not their owners: a call or an attribute access would count references to arrays
-# that threads share, which took three quarters of the kernel's time.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffers, batch_buffers, counts):  # type: ignore[no-untyped-def]
-    """Find the texels and view directions of each ray, and prefetch their coefficients while others are summed.
-
-    Args:
-        ray_buffers: scratch of one ray. batch_buffers: of all rays: 8 texels a ray, their weights, 4 view directions a
-            ray, their weights; written. counts: texels of each ray, written.
-    """
-    texel, texel_weight, view, view_weight = ray_buffers
-    texels, texel_weights, views, view_weights = batch_buffers
+def _fetch_texels(levels, direction_grid, weights, num_rays, scratch):  # type: ignore[no-untyped-def]
+    """Find the texels and view directions of each ray, and prefetch their coefficients while others are summed."""
+    texel, texel_weight, view, view_weight, texels, texel_weights, views, view_weights, num_texels, columns, _ = scratch
     for j in range(num_rays):
-        counts[j] = texels_at_level(levels, columns[U + j], columns[V + j], columns[LEVEL + j], texel, texel_weight)
+        u, v, level = columns[U + j], columns[V + j], columns[LEVEL + j]
+        num_texels[j] = texels_at_level(levels, u, v, level, texel, texel_weight)
         interpolation_weights_at(direction_grid, columns[THETA + j], columns[AZIMUTH + j], view, view_weight)
         for k in range(8):
             texels[8 * j + k], texel_weights[8 * j + k] = texel[k], texel_weight[k]
         for k in range(4):
             views[4 * j + k], view_weights[4 * j + k] = view[k], view_weight[k]
-            for first in range(0, counts[j], 2):  # two beside each other are two lines of the cache at most
+            for first in range(0, num_texels[j], 2):  # two beside each other are two lines of the cache at most
                 prefetch(weights, (view[k], texel[first], 0))
                 prefetch(weights, (view[k], texel[first + 1], NUM_COEFFICIENTS - 1))
 
@@ -158,7 +191,8 @@ def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, node
     """Integrate a texel's coefficients with the light interpolated between three lattice nodes, per channel.
 
     Args:
-        coefficients, axes, secondary_axes, vectors, nodes, weights, side: of `integrate`. tangents: of nodes.
+        coefficients, axes, secondary_axes, vectors, nodes, weights, side: coefficients, axes, secondary axes, vectors,
+            nodes, weights and side of `integrate`. tangents: tangents of nodes.
         x, y: axes of the texture, tuples.
     """
     t, u, v = vector_row(tangents, nodes[0]), vector_row(tangents, nodes[1]), vector_row(tangents, nodes[2])
@@ -171,69 +205,35 @@ def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, node
     return integrate(coefficients, axes, secondary_axes, vectors, nodes, weights, rotations, side)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _shade_texels(  # type: ignore[no-untyped-def]
-    direction_grid, tables, secondary_axes, scale, rotation, color, pixel_angle, placements, normals, hits, directions,
-    lattice_node, weight,
-    light, camera_position, rows, start, stop, out,
-):  # fmt: skip
-    """Shade rays rows[start:stop]. out: (rays, 3)"""
-    face, uv, distance = hits
-    levels, weights, step, axes = tables
-    tangents, vectors = light
-    ray_buffers = np.empty(8, np.int32), np.empty(8, np.float32), np.empty(4, np.int32), np.empty(4, np.float32)
-    texels, texel_weights = np.empty(8 * BATCH_SIZE, np.int32), np.empty(8 * BATCH_SIZE, np.float32)
-    views, view_weights = np.empty(4 * BATCH_SIZE, np.int32), np.empty(4 * BATCH_SIZE, np.float32)
-    counts, coefficients = np.empty(BATCH_SIZE, np.int64), np.empty(NUM_COEFFICIENTS, np.float32)
-    columns = np.zeros(NUM_COLUMNS * BATCH_SIZE, np.float32)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _shade_texels(btf, footprint, placements, normals, light, rows, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Shade rays rows[start:stop]. btf: `_PlacedBtf`. out: (rays, 3)"""
+    camera_position, pixel_angle, gbuffer = footprint
+    (levels, weights, step, axes), color, (tangents, vectors) = btf.tables, btf.color, light
+    lattice_node, weight, columns, coefficients = (
+        gbuffer.lattice_node,
+        gbuffer.weight,
+        scratch.columns,
+        scratch.coefficients,
+    )
     finest = np.float32(max(levels[0, 1], levels[0, 2]))
     for batch_start in range(start, stop, BATCH_SIZE):
         num_rays = min(BATCH_SIZE, stop - batch_start)
-        gather_hits(
-            placements,
-            normals,
-            face,
-            uv,
-            distance,
-            directions,
-            lattice_node,
-            weight,
-            rows,
-            batch_start,
-            num_rays,
-            columns,
-        )
-        map_to_texture(columns, num_rays, camera_position, pixel_angle, rotation, scale, finest)
-        _fetch_texels(
-            levels,
-            direction_grid,
-            weights,
-            columns,
-            num_rays,
-            ray_buffers,
-            (texels, texel_weights, views, view_weights),
-            counts,
-        )
+        gather_hits(placements, normals, gbuffer, rows, batch_start, num_rays, columns)
+        map_to_texture(columns, num_rays, camera_position, pixel_angle, btf.rotation, btf.scale, finest)
+        _fetch_texels(levels, btf.direction_grid, weights, num_rays, scratch)
         for j in range(num_rays):
             ray = rows[batch_start + j]
-            for first in range(0, counts[j], 4):
+            for first in range(0, scratch.num_texels[j], 4):
                 add_texels(
-                    weights,
-                    step,
-                    views,
-                    view_weights,
-                    4 * j,
-                    texels,
-                    texel_weights,
-                    8 * j + first,
-                    first > 0,
-                    coefficients,
-                )
+                    weights, step, scratch.views, scratch.view_weights, 4 * j, scratch.texels, scratch.texel_weights,
+                    8 * j + first, first > 0, coefficients,
+                )  # fmt: skip
             nodes = lattice_node[ray, 0], lattice_node[ray, 1], lattice_node[ray, 2]
             node_weights = weight[ray, 0], weight[ray, 1], weight[ray, 2]
             x, y, side = get_vector(columns, X, j), get_vector(columns, Y, j), columns[SIDE + j]
             texel_term = _integrate_nodes(
-                coefficients, axes, secondary_axes, tangents, vectors, nodes, node_weights, x, y, side
+                coefficients, axes, btf.secondary_axes, tangents, vectors, nodes, node_weights, x, y, side
             )
             out[ray, 0] = max(out[ray, 0] + color[0] * texel_term[0], F(0))
             out[ray, 1] = max(out[ray, 1] + color[1] * texel_term[1], F(0))
@@ -253,8 +253,9 @@ def shade_texels(
     Rays of one pixel that hit the same surface share the texel difference: a texel is as wide as the pixel's side.
 
     Args:
-        btf_materials: of the look. stored_scene: that is hit. positions: of triangle corners, meters.
-        footprint: of the camera. incident: at its probes. out: radiance along the rays, written.
+        btf_materials: BTF materials of the look. stored_scene: that is hit.
+        positions: positions of triangle corners, meters.
+        footprint: footprint of the camera. incident: at its probes. out: radiance along the rays, written.
     """
     if not btf_materials:
         return
@@ -266,41 +267,37 @@ def shade_texels(
     has_btf[[btf_material.material for btf_material in btf_materials]] = 1
     first, rows = np.empty(len(has_btf) + 1, np.int64), np.empty(len(face), np.int32)
     is_requested, reuses_center = np.zeros(len(gbuffer.is_visible), np.uint8), np.zeros(len(face), np.uint8)
-    pixel_args = gbuffer.owner, len(face) - len(gbuffer.owner) - len(gbuffer.glass.ray)
+    num_pixels = len(face) - len(gbuffer.owner) - len(gbuffer.glass.ray)
     surface_args = has_btf, stored_scene.face_material, stored_scene.face_normal
-    _subtract_center(*pixel_args, *surface_args, face, gbuffer.hits.distance, gbuffer.directions, reuses_center, out)
+    _subtract_center(gbuffer, num_pixels, *surface_args, reuses_center, out)
     _list_rays(
         face, stored_scene.face_material, has_btf, reuses_center, gbuffer.lattice_node, first, rows, is_requested
     )
     light = incident.light.around_nodes(stored_scene, incident.vectors, is_requested)
     placements = incident.light.texture_placements(stored_scene, positions)
+    kernel_footprint = footprint._replace(pixel_angle=np.float32(footprint.pixel_angle))
+    args = kernel_footprint, placements, stored_scene.lattice_nodes.normal, light, rows
     spans = [
         (
             int(first[btf_material.material]),
             int(first[btf_material.material + 1]),
-            _kernel_args(btf_material, stored_scene, placements, footprint, light),
+            _place(btf_material),
         )
         for btf_material in btf_materials
     ]
 
     def shade_range(start: int, stop: int) -> None:
-        for span_start, span_stop, args in spans:
+        scratch = _allocate_scratch()
+        for span_start, span_stop, btf in spans:
             if max(start, span_start) < min(stop, span_stop):
-                _shade_texels(*args, rows, max(start, span_start), min(stop, span_stop), out)  # type: ignore[call-arg]
+                _shade_texels(btf, *args, max(start, span_start), min(stop, span_stop), scratch, out)
 
     parallel_for_chunks(shade_range, int(first[-1]), _CHUNKS_PER_THREAD)
-    _add_center(*pixel_args, reuses_center, out)
+    _add_center(gbuffer.owner, num_pixels, reuses_center, out)
 
 
-def _kernel_args(
-    btf_material: BtfMaterial, stored_scene: StoredScene, placements: F32, footprint: TextureFootprint, light: NodeLight
-) -> tuple[Any, ...]:
-    texels, gbuffer = btf_material.texels, footprint.gbuffer
-    rotation = (np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation)))
-    return (
-        texels.btf.grid, btf_material.tables, pack_secondary_axes(btf_material.tables.axes), np.float32(texels.scale),
-        rotation, btf_material.color,
-        np.float32(footprint.pixel_angle), placements, stored_scene.lattice_nodes.normal,
-        (gbuffer.hits.face, gbuffer.hits.uv, gbuffer.hits.distance), gbuffer.directions, gbuffer.lattice_node,
-        gbuffer.weight, light, footprint.camera_position,
-    )  # fmt: skip
+def _place(btf_material: BtfMaterial) -> _PlacedBtf:
+    texels, tables = btf_material.texels, btf_material.tables
+    rotation = np.float32(math.cos(texels.rotation)), np.float32(math.sin(texels.rotation))
+    axes, scale = pack_secondary_axes(tables.axes), np.float32(texels.scale)
+    return _PlacedBtf(texels.btf.grid, tables, axes, scale, rotation, btf_material.color)

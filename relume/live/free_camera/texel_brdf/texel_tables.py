@@ -34,7 +34,7 @@ from relume.live.free_camera.texel_brdf.coefficient_packing import (
     NUM_FUNCTIONS,
     WIDTH,
 )
-from relume.math.zernike import project
+from relume.math.zernike import basis_functions
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -51,7 +51,7 @@ class TexelTables(NamedTuple):
 
     Attributes:
         levels: mip levels that are stored, see `LocalPcaBtf`.
-        weight: packed coefficients of each texel minus those of the mean, in steps. step: of each coefficient.
+        weight: packed coefficients of each texel minus those of the mean, in steps. step: step of each coefficient.
         axes: orthonormal columns of the color space in which coefficients are packed.
     """
 
@@ -65,7 +65,7 @@ class BtfMaterial(NamedTuple):
     """A BTF on a material.
 
     Attributes:
-        material: index of the material. texels: the BTF and its placement. tables: of the BTF. color: tint.
+        material: index of the material. texels: the BTF and its placement. tables: tables of the BTF. color: tint.
     """
 
     material: int
@@ -234,7 +234,7 @@ def filtered_factors(direction_grid: DirectionGrid) -> Shaped[F64, "directions l
     sine = np.sqrt(1 - z**2)
     wi = np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=1)
     index, weight, retained = interpolation_weights_numpy(direction_grid, wi)
-    functions = pack_lanes(project(wi)[:, :NUM_FUNCTIONS]) * (retained * (2 * np.pi / len(z)))[:, None]
+    functions = pack_lanes(basis_functions(wi)[:, :NUM_FUNCTIONS]) * (retained * (2 * np.pi / len(z)))[:, None]
     out = np.zeros((direction_grid.num_directions, WIDTH))
     for tap in range(index.shape[1]):
         np.add.at(out, index[:, tap], weight[:, tap, None] * functions)

@@ -8,7 +8,6 @@ aliasing.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba as nb
 import numpy as np
@@ -16,9 +15,9 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import texture_footprint
 from relume.math.fast_math import acos_clamped, azimuth_fraction
+from relume.probes.stored_scene import StoredScene
 from relume.transport.btf_kernel import mip_level
 
 F32 = NDArray[np.float32]
@@ -62,7 +61,7 @@ def face_placements(positions: Shaped[F32, "corners 3"], stored_scene: StoredSce
     """Return the placement of the texture on each triangle: one row, one cache line.
 
     Args:
-        positions: of triangle corners, meters. stored_scene: has the triangles.
+        positions: positions of triangle corners, meters. stored_scene: has the triangles.
     Returns:
         Texture x axis along the triangle, unit; handedness of its axes, 1 if y is to the left of x about the normal of
         counterclockwise corners, else −1, 0 without texture coordinates; coordinates of the first corner; from there to
@@ -97,14 +96,14 @@ def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def gather_hits(placements, normals, face, uv, distance, directions, lattice_node, weight, rows, start, num, columns):  # type: ignore[no-untyped-def]
+def gather_hits(placements, normals, gbuffer, rows, start, num, columns):  # type: ignore[no-untyped-def]
     """Gather the hits of rays rows[start:start + num] into columns; at most `BATCH_SIZE` rays.
 
     Args:
-        placements: from `face_placements`. normals: of lattice nodes. face, uv, distance: hits of the rays.
-        directions: of the rays. lattice_node, weight: interpolation nodes of the hits and their weights.
+        placements: from `face_placements`. normals: of lattice nodes. gbuffer: of the rays.
         columns: written. (NUM_COLUMNS · BATCH_SIZE,)
     """
+    (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
     for j in range(num):
         ray = rows[start + j]
         f, a, b, c = face[ray], lattice_node[ray, 0], lattice_node[ray, 1], lattice_node[ray, 2]
@@ -179,7 +178,7 @@ def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
     """Return the fraction of a repeat; written out, because floor would be a call."""
-    clamped: Any = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
+    clamped = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
     fraction = np.float32(clamped - np.float32(np.int32(clamped)))
     return fraction + np.float32(1) if fraction < 0 else fraction
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import mark_needed_probes
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.texel_brdf.coefficient_packing import EMPTY_LANE, FUNCTIONS, HALF, HAS_ORDER, PAIRS, WIDTH
 from relume.live.free_camera.texel_brdf.texture_coordinates import cross, dot, face_placements, vector_row
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -66,9 +66,10 @@ def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[n
     """Add a rotated coefficient vector.
 
     Args:
-        lanes: of the vector. (3 F,) float32. rotation: from `_rotation_powers`. side: −1 if azimuths run the other way,
+        lanes: lanes of the vector. (3 F,) float32. rotation: from `_rotation_powers`.
+        side: −1 if azimuths run the other way,
             else 1.
-        weight: of the vector. is_added: add to `out`, else overwrite it. (3 F,) float32
+        weight: weight of the vector. is_added: add to `out`, else overwrite it. (3 F,) float32
     """
     c1, s1, c2, s2, c3, s3, c4, s4 = rotation
     for i in range(PAIRS):

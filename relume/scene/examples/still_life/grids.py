@@ -20,7 +20,7 @@ class GridSurface:
     """Triangles with shading frames, in meters, +Y up.
 
     Attributes:
-        faces: counter-clockwise from outside.
+        faces: counterclockwise from outside.
     """
 
     positions: Shaped[F64, "vertices 3"]
@@ -55,7 +55,7 @@ def normalize(vectors: Shaped[F64, "*batch k"]) -> Shaped[F64, "*batch k"]:
 
 
 def rotation_y(degrees: float) -> Shaped[F64, "3 3"]:
-    """Rotation about +Y, counter-clockwise from above."""
+    """Rotation about +Y, counterclockwise from above."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 

@@ -20,9 +20,9 @@ def contact_height(height: Height, x: float, z: float, radius: float) -> float:
     """Height of a sphere's center after it is lowered at (x, z) until it touches the ground, meters.
 
     Args:
-        height: of the ground at any (x, z), meters.
-        x, z: of the center, meters.
-        radius: of the sphere, meters.
+        height: height of the ground at any (x, z), meters.
+        x, z: coordinates of the center, meters.
+        radius: radius of the sphere, meters.
     """
     r = radius * np.sqrt(np.linspace(0, 1, 24))[:, None]
     phi = np.linspace(0, 2 * np.pi, 33)[None, :-1]
@@ -36,9 +36,9 @@ def place_along_path(
     """Centers of touching pearls on a string along a path, each resting on the ground.
 
     Args:
-        height: of the ground at any (x, z), meters.
+        height: height of the ground at any (x, z), meters.
         path: points in (x, z), meters.
-        radii: of the pearls in order, meters.
+        radii: radii of the pearls in order, meters.
     Returns:
         In meters, only for the pearls that fit on the path.
     """
@@ -62,11 +62,11 @@ def pour_heap(
     """Centers of pearls poured into a heap: each takes the lowest free position among random candidates.
 
     Args:
-        height: of the ground at any (x, z), meters.
-        center: of the heap in (x, z), meters.
+        height: height of the ground at any (x, z), meters.
+        center: center of the heap in (x, z), meters.
         spread: largest distance of candidates from the center, meters.
-        radii: of the pearls in the order in which they fall, meters.
-        seed: of the candidates.
+        radii: radii of the pearls in the order in which they fall, meters.
+        seed: seed of the candidates.
     Returns:
         In meters.
     """

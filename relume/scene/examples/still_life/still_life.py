@@ -52,7 +52,7 @@ def look_at(name: str, position: tuple[float, float, float], target: tuple[float
     """Return a level camera at `position` with `target` in the center of its image.
 
     Args:
-        name: of the view.
+        name: name of the view.
         position, target: world space, meters; the view direction must not be vertical.
         yfov: vertical field of view, radians.
     """

@@ -112,7 +112,7 @@ def tube(path: Shaped[F64, "points 3"], radius: float, num_sides: int) -> GridSu
     Args:
         path: center line, meters.
         radius: meters.
-        num_sides: of the polygon that approximates its circle.
+        num_sides: number of sides of the polygon that approximates its circle.
     """
     forward = normalize(np.gradient(path, axis=0))
     right = normalize(np.cross(forward, [0.0, 1.0, 0.0]))

@@ -24,10 +24,10 @@ from relume_server.io.import_request import UPLOAD_PREFIX, ImportRequest
 from relume_server.io.upload_middleware import ReservationDep
 from relume_server.io.uploads import plain_stem, save_upload, upload_bytes
 from relume_server.jobs.btf_jobs import BtfJob
-from relume_server.jobs.job import JobFilter, new_id
 from relume_server.schemas.base import Id, JobState
 from relume_server.schemas.btfs import BOUND, TEXELS, Bound, BtfJobBody, BtfRequest, Period, SyntheticBtfRequest, Texels
 from relume_server.services import Services, ServicesDep
+from relume_worker.jobs.job import JobFilter, new_id
 
 PREFIX = "/api/materials/btf/jobs"
 router = APIRouter(prefix=PREFIX, tags=["materials"])
@@ -85,7 +85,9 @@ async def make_synthetic_btf(
     """Queue the rendering of a synthetic BTF from a built-in geometry."""
     name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
     btf_request = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
-    async with services.intake.reserving(caller.name, 1) as reservation:  # its final size is unknown until it is made
+    async with services.import_queue.reserving(
+        caller.name, 1
+    ) as reservation:  # its final size is unknown until it is made
         identity = await run_in_threadpool(_submit, btf_request, 0, reservation, services)
     return await run_in_threadpool(_answer, identity, services, response)
 
@@ -104,7 +106,7 @@ async def make_btf_from_mesh(
     """Queue the rendering of a synthetic BTF from an uploaded mesh, which is validated first."""
     stem = name or f"{plain_stem(geometry.filename) or 'Mesh'} (synthetic)"
     btf_request = BtfRequest(name=check_name(stem), error=error, geometry=MESH, size=size, period=period)
-    identity = await services.intake.run_in_slot(
+    identity = await services.import_queue.run_in_slot(
         reservation.owner, partial(_submit_mesh, geometry, btf_request, reservation, services)
     )
     return await run_in_threadpool(_answer, identity, services, response)
@@ -114,7 +116,7 @@ def _submit_mesh(mesh: UploadFile, btf_request: BtfRequest, reservation: Reserva
     with tempfile.TemporaryDirectory(dir=services.settings.data, prefix=UPLOAD_PREFIX) as folder:
         path = save_upload(mesh, Path(folder) / UPLOAD_FILE)
         import_request = ImportRequest.create(services.settings, "tile", path, btf_request.name)
-        services.intake.read(reservation, replace(import_request, period=btf_request.period), Path(folder))
+        services.import_queue.read(reservation, replace(import_request, period=btf_request.period), Path(folder))
         return _submit(
             btf_request, upload_bytes(mesh), reservation, services, lambda into: shutil.move(path, into / UPLOAD_FILE)
         )

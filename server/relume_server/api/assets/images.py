@@ -69,7 +69,7 @@ async def put_metalness(
         return load_material(fetch_if_missing(scene_path(data, scene)), material)
 
     compute_terms = partial(with_metalness, folder, terms, image, request.scene, request.material, read)
-    metallic_terms = await services.intake.run_in_slot(caller.name, compute_terms)
+    metallic_terms = await services.import_queue.run_in_slot(caller.name, compute_terms)
     for name in sorted({texture for term in metallic_terms if is_user_image(texture := term["texture"])}):
         await run_in_threadpool(_assign_owner, services, caller, folder, name.removeprefix(IMAGES.prefix))
     return MetalnessBody(terms=metallic_terms)

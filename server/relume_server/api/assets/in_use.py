@@ -22,7 +22,8 @@ async def remove_unused(
     """Delete an asset that no saved look, share link, session of this server or running job uses.
 
     Args:
-        store, folder, identity: of the asset. kind: for quotas. services: of the server.
+        store, folder, identity: store, folder and id of the asset. kind: kind of asset, for quotas.
+        services: services of the server.
         called: name in messages; default: its id.
     Raises:
         NotFoundError: it does not exist. InUseError: it is in use; nothing is deleted.
@@ -44,8 +45,8 @@ def _check_unused(label: str, quoted_id: str, services: Services, sessions: list
     users = [f"look {name!r}" for name in services.looks.referencing(quoted_id)]
     users += [f"link {identity}" for identity in services.shares.referencing(quoted_id)]
     users += [f"a session of bake {bake}" for bake in sessions]
-    for queue in (services.renders, services.comparisons):
-        users += [f"{queue.noun} {work}" for work in queue.referencing(quoted_id)]
+    for kind in (services.renders, services.comparisons):
+        users += [f"{kind.name} {job}" for job in kind.referencing(quoted_id)]
     if users:
         more = f" and {len(users) - _MAX_NAMED} more" if len(users) > _MAX_NAMED else ""
         raise InUseError(f"{label} is used by {', '.join(users[:_MAX_NAMED])}{more}; change or delete these first")

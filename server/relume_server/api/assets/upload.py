@@ -24,8 +24,8 @@ async def store_upload(
     """Store an upload, and return its id.
 
     Args:
-        file: of the upload. name: given name; empty: the file's. kind: of the asset.
-        reservation: of its bytes.
+        file: file of the upload. name: given name; empty: the file's. kind: kind of the asset.
+        reservation: reservation of its bytes.
     """
     called = check_name(name or plain_stem(file.filename) or kind.capitalize())
 
@@ -33,4 +33,4 @@ async def store_upload(
         path = save_upload(file, folder / kind)
         return ImportRequest.create(services.settings, kind, path, called, scene=plain_name(file.filename))
 
-    return await services.intake.import_file(reservation, make_request)
+    return await services.import_queue.import_file(reservation, make_request)

@@ -21,7 +21,7 @@ class BakeUpdates:
     """Polls the database, which other processes change as well: once for all sessions of a scene.
 
     Args:
-        list_bakes: of a scene. threads: for the query; for short work only.
+        list_bakes: returns the bakes of a scene. threads: threads for the query; for short work only.
     """
 
     def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]], threads: Executor) -> None:

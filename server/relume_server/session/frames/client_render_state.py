@@ -45,7 +45,7 @@ class ClientRenderState:
         """Record a sent frame.
 
         Args:
-            is_outdated: it is the first of its look. target: of the frame. painted: result of the step.
+            is_outdated: it is the first of its look. target: target of the frame. painted: result of the step.
         """
         self._last_kind = self._edit_kind(target)
         if painted.client_keys is None:

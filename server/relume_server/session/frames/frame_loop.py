@@ -12,6 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from relume.core.errors import RelumeError, ResultUnavailableError
+from relume.live.fixed_camera.jobs import Job, Priority
 from relume.live.fixed_camera.protocols import CameraMode
 from relume_server.client_state.target import Target
 from relume_server.runtime.executors import SerialExecutor, Threads
@@ -25,7 +26,6 @@ from relume_server.session.frames.viewport import Viewport
 from relume_server.session.session_state import SessionState
 
 if TYPE_CHECKING:
-    from relume.live.fixed_camera.jobs import Job
     from relume_server.collaboration.member import RoomMember
 
 REFINE_DELAY_S = 0.040  # a drag sends edits at least this often; refining in between would only delay the next frame
@@ -209,7 +209,7 @@ class FrameLoop:
             return
         viewport, job, result = finished
         if viewport in self._viewports.values():
-            viewport.on_installed(await self._work.run_short(painter.install, viewport.picture, job, result))
+            viewport.on_installed(await self._work.run_short(painter.apply, viewport.picture, job, result))
             self._refine_at_s = 0.0
         await self._precomputer.send_ready(viewport, job)
         if isinstance(result, ResultUnavailableError):
@@ -242,7 +242,7 @@ class FrameLoop:
         """True if a job is no longer needed; an image of an older look is still useful if there is none."""
         if viewport not in self._viewports.values():
             return True
-        is_optional = job.state == "precomputing" or job.is_refinement
+        is_optional = job.priority in (Priority.CONTROL, Priority.REFINEMENT)
         return is_optional and (viewport.job is None or viewport.job.key != job.key)
 
     async def _answer(self) -> bool:

@@ -12,7 +12,7 @@ def trace_fields(
     """Return the name, times and attributes of a frame's span.
 
     Args:
-        request: answered by the frame. painted: result of the step. num_bytes: of the message.
+        request: answered by the frame. painted: result of the step. num_bytes: size in bytes of the message.
         send_start_s, send_end_s: before and after sending, seconds of `time.perf_counter`.
     """
     received_s = request.received_s or painted.started_s
@@ -34,7 +34,7 @@ def trace_fields(
         "room_revision": request.target.room_revision,
         "active_control": request.target.active_pointer or "",
         "format": request.form,
-        "fidelity": painted.progress.fidelity,
+        "fidelity": painted.progress.fidelity.value,
         "bytes": num_bytes,
     }
     return "edit" if request.camera_state is None else "camera", times, attributes

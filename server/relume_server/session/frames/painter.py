@@ -16,13 +16,15 @@ from relume.core.errors import ParameterError
 from relume.image_io.downsample import downsample
 from relume.image_io.tone_mapping import tone_map
 from relume.image_io.write_image import to_bytes
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look.model import DisplayLook
 from relume_server.client_state.target import CameraState, Target
-from relume_server.runtime.protocols import FixedPicture, FreeCameraPicture, Picture, Progress, Tile
+from relume_server.runtime.protocols import FixedPicture, FreeCameraPicture, Picture, Tile
 from relume_server.schemas.protocol import ArrayInfo, FrameHeader, FrameTimes, SceneUpdate
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
 
 Format = Literal["rgb9e5", "jpeg"]
@@ -35,7 +37,7 @@ class FrameRequest:
 
     Attributes:
         target: look of the frame.
-        accepting: images that do not have this look yet; all take it, or none.
+        accepting: images that do not have this look yet; all accept it, or none.
         missing_tiles: tiles that the client lacks in HDR, besides those that this step changes.
         only_exact: send nothing unless the step makes the image, or its visible region, exact.
         region: visible region; None: all. has_new_region: the image does not know it yet.
@@ -43,10 +45,10 @@ class FrameRequest:
         is_visible_exact: the client knows that its visible region is exact.
         is_due: there is something to send even if this step changes nothing.
         is_client_exact: the client knows that its image is exact.
-        size: of the image. jpeg_size: of its JPEG, no larger.
+        size: size of the image. jpeg_size: size of its JPEG, no larger.
         received_s: time of the edit or camera message that no frame has answered yet, if any.
-        camera_state: to set before the step; None if it is set, or fixed.
-        camera_seq: of the camera that the frame shows.
+        camera_state: camera state to set before the step; None if it is set, or fixed.
+        camera_seq: sequence number of the camera that the frame shows.
         client_keys: keys of the parts that the client's shader has, if it renders; otherwise None.
     """
 
@@ -118,9 +120,9 @@ def prepare(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
     return [picture.next_job() for picture in all_pictures]
 
 
-def install(picture: Picture, job: Job, result: Any) -> Job | None:
-    """Install a result; returns the next job of the image."""
-    picture.install(job, result)
+def apply(picture: Picture, job: Job, result: Any) -> Job | None:
+    """Apply the result of an image's job; returns its next job."""
+    job.apply(result)
     return picture.next_job()
 
 
@@ -145,7 +147,7 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     ):
         return _pack_scene_update(request, progress, job, shader_data, start_s)
     has_changes = bool(progress.tiles) or request.is_due
-    must_wait = request.only_exact and (progress.fidelity != "exact" or request.is_visible_exact)
+    must_wait = request.only_exact and (progress.fidelity != Fidelity.EXACT or request.is_visible_exact)
     should_send = (has_changes or not request.is_client_exact) if progress.exact else (has_changes and not must_wait)
     if not should_send:
         return Painted(job, progress, None, update_ms, start_s)
@@ -211,7 +213,7 @@ def _pack_scene_update(
     """Pack the parts that the client's shader lacks; nothing if it has all, and knows that the look is shown."""
     blocks, shader_arrays = shader_data
     client_keys: Mapping[str, Hashable] = request.client_keys or {}
-    progress = replace(cast("Any", progress), tiles=[])
+    progress = replace(progress, tiles=[])
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
     missing_blocks = [block for name, block in blocks.items() if client_keys.get(name, _NOTHING) != block.key]

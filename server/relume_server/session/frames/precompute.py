@@ -6,18 +6,16 @@ import asyncio
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from relume.core.errors import CancelledError
+from relume.live.fixed_camera.jobs import Job, Priority
 from relume_server.client_state.socket import ClientSocket
 from relume_server.runtime.executors import Threads
 from relume_server.schemas.protocol import StatusMessage
 from relume_server.session.frames.viewport import Viewport
 from relume_server.telemetry.metrics import Metrics
 from relume_server.telemetry.traces import Traces
-
-if TYPE_CHECKING:
-    from relume.live.fixed_camera.jobs import Job
 
 STATUS_INTERVAL_S = 0.100
 
@@ -88,7 +86,7 @@ class Precomputer:
             return None
         if error is not None:
             raise error
-        if running.job.state != "updating":
+        if _is_reported(running.job):
             self._metrics.freeze.observe(time.perf_counter() - running.start_s)
         if self._traces is not None:
             attributes = {"view": running.viewport.name, "label": running.job.label, "state": running.job.state}
@@ -97,7 +95,7 @@ class Precomputer:
 
     async def send_ready(self, viewport: Viewport, job: Job) -> None:
         """Notify the client that the job is installed or given up."""
-        if job.state != "updating":
+        if _is_reported(job):
             await self._socket.send(StatusMessage(state="ready", view=viewport.name, label=job.label, progress=1.0))
 
     async def end(self) -> None:
@@ -112,7 +110,7 @@ class Precomputer:
 
     async def _send_progress(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
         """Report progress, each percent once; not for jobs of a drag."""
-        if job.state == "updating":
+        if not _is_reported(job):
             await asyncio.wait({future})
             return
         last_fraction = -1.0
@@ -122,6 +120,11 @@ class Precomputer:
                 last_fraction = fraction
                 await self._socket.send(StatusMessage(state=job.state, view=view, label=job.label, progress=fraction))
             await asyncio.wait({future}, timeout=STATUS_INTERVAL_S)
+
+
+def _is_reported(job: Job) -> bool:
+    """True if its status is sent; updates of a drag take only a few frames."""
+    return job.priority is not Priority.UPDATE
 
 
 def _note_error(done: asyncio.Future[Any]) -> None:

@@ -1,4 +1,4 @@
-"""Answers besides frames: the open curve, a pixel, the highlighted pixels of a curve."""
+"""Responses besides frames: the open curve, a pixel, the highlighted pixels of a curve."""
 
 from __future__ import annotations
 

@@ -6,10 +6,11 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume_server.client_state.flow_control import FrameWindow
 from relume_server.client_state.pending_requests import PendingRequests
 from relume_server.client_state.target import CameraState, Target
-from relume_server.runtime.protocols import FreeCameraPicture, Picture, Progress, Tile
+from relume_server.runtime.protocols import FreeCameraPicture, Picture, Tile
 from relume_server.schemas.protocol import HighlightMessage
 from relume_server.session.frames.client_render_state import ClientRenderState
 from relume_server.session.frames.coefficient_budget import CoefficientBudget
@@ -17,6 +18,7 @@ from relume_server.session.frames.painter import Format, FrameRequest, Painted
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.fixed_camera.protocols import CameraView
 
 REFINE_SEND_INTERVAL_S = 0.100
@@ -34,19 +36,19 @@ class Viewport:
     """Chooses the next frame of a view, and records its result.
 
     Attributes:
-        target: of the last step.
+        target: target of the last step.
         job: what the image waits for.
         is_converged: another step would change nothing.
-        is_exact: the client's image is exact. progress: of the last step.
+        is_exact: the client's image is exact. progress: progress of the last step.
         not_before_s: no refined frame is sent earlier.
-        camera_state: of the last step, for a free camera.
+        camera_state: camera state of the last step, for a free camera.
         highlight: pending interval of a curve to highlight. served_s: time of its last turn.
     """
 
     def __init__(self, view: CameraView, picture: Picture, *, is_free_camera: bool) -> None:
         """
         Args:
-            view: of the bake. picture: its live image. is_free_camera: then it has something to show at once.
+            view: view of the bake. picture: its live image. is_free_camera: then it has something to show at once.
         """
         self.name, self.size, self.picture = view.name, (view.width, view.height), picture
         self.target: Target | None = None
@@ -191,7 +193,7 @@ class Viewport:
             return
         self._missing_tiles = self._all_tiles if request.form == "jpeg" else painted.deferred_tiles
         self._has_unsent, self._answered_target, self.is_exact = False, request.target, exact
-        self._visible_exact_target = request.target if painted.progress.fidelity == "exact" else None
+        self._visible_exact_target = request.target if painted.progress.fidelity == Fidelity.EXACT else None
         self._is_blank = self._is_blank and not exact
         self.is_converged = is_done and not self._has_unsent_data(pending)
         self.not_before_s = 0.0

@@ -17,9 +17,9 @@ export interface ImageChoiceProps {
   fallbackLabel?: string;
   children: ComponentChildren;
   assign: AssignImage;
-  unassign(material: string): void | Promise<void>;
+  unassign: (material: string) => void | Promise<void>;
   /** An option other than an image was chosen. */
-  onOther(value: string): void;
+  onOther: (value: string) => void;
 }
 
 export function ImageChoice({ label, title, file, material, displayedImage, fallbackLabel = "", children, assign, unassign, onOther }: ImageChoiceProps) {

@@ -7,7 +7,7 @@ const TYPES = ".png,.jpg,.jpeg,.webp,.exr";
 interface Props {
   /** The tooltip: purpose of the image. */
   label: string;
-  onFile(file: File): void;
+  onFile: (file: File) => void;
 }
 
 export function ImageFileField({ label, onFile }: Props) {

@@ -11,7 +11,7 @@ interface Props {
   value: string | null;
   /** True if the scene has a roughness map. */
   hasOwn: boolean;
-  onChange(value: string | null): void;
+  onChange: (value: string | null) => void;
 }
 
 export function RoughnessImage({ material, index, value, hasOwn, onChange }: Props) {

@@ -1,1 +1,0 @@
-"""Background compositing: the environment behind the image, shadow catchers, alpha."""

@@ -1,1 +1,0 @@
-"""Incident radiance coefficients of probes: exact, previewed, or updated during an edit."""

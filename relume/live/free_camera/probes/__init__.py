@@ -1,1 +1,0 @@
-"""Surface probes: their placement, the lattice of interpolation nodes, map overrides."""

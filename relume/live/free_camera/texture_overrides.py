@@ -1,0 +1,131 @@
+"""Map overrides: images of a look that replace the maps of materials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.brdf.texture_slots import Images, NormalMap
+from relume.images.image_store import load_normal_map, load_texture
+from relume.probes.stored_scene import MAX_TEXTURE_SIDE, StoredScene, Textures, concatenate_textures
+from relume.raytrace.surface_interaction import triplanar_axes
+from relume.scene.model import WRAPS, Texture
+
+F32 = NDArray[np.float32]
+
+
+class ProbeMapOverrides(NamedTuple):
+    """Overrides of a material: for each of `TEXTURES`, and of the normal map; None keeps the baked map."""
+
+    images: Images = (None, None)
+    normals: NormalMap | None = None
+
+    @property
+    def columns(self) -> tuple[str | NormalMap | None, ...]:
+        """The overrides as columns of `Textures.material_textures`."""
+        return *self.images, self.normals
+
+
+NO_OVERRIDES = ProbeMapOverrides()
+
+
+class OverriddenTextures(NamedTuple):
+    """Fields of `relume.probes.stored_scene.StoredScene` that overrides change."""
+
+    textures: Textures
+    uvs: F32
+    uv_faces: NDArray[np.uint32]
+    uv_scale: F32
+    tangents: F32
+
+
+def overridden_textures(
+    stored_scene: StoredScene, positions: Shaped[F32, "corners 3"], overrides: Sequence[ProbeMapOverrides]
+) -> OverriddenTextures:
+    """Apply map overrides to a stored scene.
+
+    Args:
+        stored_scene: as baked. positions: positions of triangle corners. overrides: overrides of each material.
+    Raises:
+        NotFoundError, SceneError: an image cannot be loaded.
+    """
+    names = list(dict.fromkeys(name for override in overrides for name in override.columns if name is not None))
+    override_textures = list(map(_load_texture, names))
+    baked_textures, override_levels = stored_scene.textures, concatenate_textures(override_textures, MAX_TEXTURE_SIDE)
+    wraps = np.array([[WRAPS.index(wrap) for wrap in texture.wrap] for texture in override_textures], np.int64).reshape(
+        -1, 2
+    )
+    material_textures = baked_textures.material_textures.copy()
+    for material, override in enumerate(overrides):
+        for column, name in enumerate(override.columns):
+            if name is not None:
+                material_textures[material, column] = len(baked_textures.wraps) + names.index(name)
+    textures = Textures(
+        np.concatenate([baked_textures.texels, override_levels.texels]),
+        np.concatenate([baked_textures.levels, override_levels.levels + np.array([len(baked_textures.texels), 0, 0])]),
+        np.concatenate([baked_textures.first, baked_textures.first[-1] + override_levels.first[1:]]),
+        np.concatenate([baked_textures.wraps, wraps]),
+        material_textures,
+    )
+    uvs, uv_faces, uv_scale = _project_uvs(
+        stored_scene, positions, np.array([override != NO_OVERRIDES for override in overrides])
+    )
+    has_normal_map = np.array([override.normals is not None for override in overrides])
+    return OverriddenTextures(
+        textures, uvs, uv_faces, uv_scale, _tangents(stored_scene, positions, uvs[uv_faces], has_normal_map)
+    )
+
+
+def _load_texture(name: str | NormalMap) -> Texture:
+    return load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name)
+
+
+def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, has_normal_map: NDArray[np.bool_]) -> F32:
+    """Compute missing tangents along u, averaged over adjacent triangles by area.
+
+    Args:
+        uv_coordinates: UV coordinates of each triangle's corners. (faces, 3, 2) has_normal_map: flags of materials.
+    """
+    if not has_normal_map.any():
+        return stored_scene.tangents
+    out = stored_scene.tangents.copy() if len(stored_scene.tangents) else np.zeros((len(positions), 4), np.float32)
+    needs_tangent = has_normal_map[stored_scene.face_material]
+    needs_tangent &= ~out[stored_scene.faces].any(axis=(1, 2))
+    faces = stored_scene.faces[needs_tangent]
+    p, uv = positions[faces].astype(np.float64), uv_coordinates[needs_tangent].astype(np.float64)
+    e, d = p[:, 1:] - p[:, :1], uv[:, 1:] - uv[:, :1]
+    area = d[:, 0, 0] * d[:, 1, 1] - d[:, 1, 0] * d[:, 0, 1]
+    along = np.sign(area)[:, None] * (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:])
+    face_tangents = np.column_stack([along, -np.sign(area) * np.linalg.norm(np.cross(e[:, 0], e[:, 1]), axis=1)])
+    corners = faces.ravel()
+    total = np.stack([np.bincount(corners, np.repeat(c, 3), len(out)) for c in face_tangents.T], axis=1)
+    length = np.linalg.norm(total[:, :3], axis=1)
+    is_defined = np.flatnonzero(length > 0)
+    out[is_defined, :3] = total[is_defined, :3] / length[is_defined, None]
+    out[is_defined, 3] = np.where(total[is_defined, 3] < 0, -1, 1)
+    return out
+
+
+def _project_uvs(
+    stored_scene: StoredScene, positions: F32, has_images: NDArray[np.bool_]
+) -> tuple[F32, NDArray[np.uint32], F32]:
+    """Compute missing texture coordinates by tri-planar projection, one texture unit per meter.
+
+    Returns:
+        Fields `uvs`, `uv_faces` and `uv_scale` of the scene.
+    """
+    flat = np.flatnonzero((stored_scene.uv_scale == 0) & has_images[stored_scene.face_material])
+    if not len(flat):
+        return stored_scene.uvs, stored_scene.uv_faces, stored_scene.uv_scale
+    across, up = triplanar_axes(stored_scene.face_normal[flat])
+    corners = positions[stored_scene.faces[flat]]
+    u, v = np.einsum("fkc,fc->fk", corners, across), -np.einsum("fkc,fc->fk", corners, up)
+    uvs = np.concatenate([stored_scene.uvs, np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)])
+    uv_faces, uv_scale = stored_scene.uv_faces.copy(), stored_scene.uv_scale.copy()
+    uv_faces[flat] = len(stored_scene.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
+    uv_scale[flat] = 1
+    return uvs, uv_faces, uv_scale

@@ -1,0 +1,395 @@
+"""Bakes of fixed views, opened for freezing and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment_names import load_environment
+from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError, StoreError
+from relume.core.source_hash import image_code
+from relume.lights.light_clusters import cluster_lights, num_clusters
+from relume.lights.local_lights import num_samples
+from relume.lights.prefilter import downsampled, prefiltered
+from relume.lights.sphere_tiles import Tiles
+from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights, ShadowCache
+from relume.live.opened.retrace import NormalRetracer
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
+from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
+from relume.operators.image_cache import ImageFiles
+from relume.raytrace.surface_points import SurfacePoints
+from relume.store.bake_protocol import StoreReader
+from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
+from relume.views.downsampled import DownsampledStore
+from relume.views.view import View, open_view
+
+PREVIEW_WIDTH = 256
+_EDITED_BYTES = 256 << 20
+
+F32 = NDArray[np.float32]
+FindLights = Callable[[EnvironmentKey, LightQuality], TriangleLights]
+"""Returns the triangles of an environment."""
+
+
+@dataclass(frozen=True)
+class BakedFixedViews:
+    """One bake of fixed views with direct illumination; a `relume.live.fixed_camera.protocols.FixedViewTransfer`.
+
+    Attributes:
+        cache: cache of results computed from the bake.
+        key: path of the store; identifies this bake's entries in the cache.
+        default_look: the complete look of the scene as it was imported.
+    """
+
+    cache: Cache
+    key: str
+    store: StoreReader
+    scene_id: str
+    method: str
+    num_lights: int
+    default_look: dict[str, Any]
+    material_names: Sequence[str]
+    views: dict[str, View]
+
+    camera_mode = CameraMode.FIXED
+    axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.LIGHT, EditAxis.ENVIRONMENT))
+
+    @classmethod
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
+        """Open a store: an `Opener`.
+
+        Args:
+            store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+        Raises:
+            StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
+        """
+        return cls(**read_fields(store, key, cache))
+
+    @cached_property
+    def derived(self) -> ImageFiles:
+        """Images of the default look, computed once."""
+        return ImageFiles(Path(self.key) / "derived", image_code())
+
+    @cached_property
+    def edited(self) -> ImageFiles:
+        """The newest images of other looks, to open the same look after a restart."""
+        return ImageFiles(Path(self.key) / "edited", image_code(), _EDITED_BYTES)
+
+    def has_image(self, key: Hashable) -> bool:
+        """True if the image of a term is saved beside the store; the key does not include the store's."""
+        return self.derived.has(key) or self.edited.has(key)
+
+    @cached_property
+    def local(self) -> LocalLights:
+        """Local lights of the scene."""
+        return LocalLights(self.store, self.cache, self.key)
+
+    @cached_property
+    def tracer(self) -> NormalRetracer:
+        """Tracer for normals that were not baked."""
+        return NormalRetracer(self.store, self.local, None)
+
+    @cached_property
+    def lights(self) -> TriangleLights:
+        """The environment's triangles."""
+        return read_lights(self.store)
+
+    def environment_radiance(self, name: str | None) -> Shaped[NDArray[np.float32], "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own.
+
+        Raises:
+            NotFoundError: it does not exist here. SceneError: its files are damaged.
+        """
+        return load_environment(name).radiance if name is not None else self._scene_radiance()
+
+    def _scene_radiance(self) -> F32:
+        def read() -> F32:
+            return np.asarray(self.store.read("lights/environment"), np.float32)
+
+        return self.cache.get_value((self.key, "environment"), read)
+
+    def environment_lights(self, environment: EnvironmentKey, quality: LightQuality) -> TriangleLights:
+        """Return the triangles of an environment: the tiles of the bake with new weights."""
+        if quality is LightQuality.PREVIEW:  # a large map takes seconds
+            return self.coarse_weights("lights", environment, self.environment_radiance)
+        if quality is LightQuality.MERGED:
+            return self._merged_lights(environment)
+        return self.lights if environment == BAKED_ENVIRONMENT else self._integrate_environment(environment)
+
+    def direct_lights(self, light: Illumination, quality: LightQuality) -> TriangleLights:
+        """Return the environment triangles for direct illumination of the image."""
+        return displayed_of(self.environment_lights(light.environment, quality), light)
+
+    def _merged_lights(self, environment: EnvironmentKey) -> TriangleLights:
+        def merge() -> TriangleLights:
+            lights = self.environment_lights(environment, LightQuality.EXACT)
+            return cluster_lights(lights, self.tiles, num_clusters(self.num_lights))
+
+        return self.cache.get_value((self.key, "merged lights", environment), merge)
+
+    def _integrate_environment(self, environment: EnvironmentKey) -> TriangleLights:
+        def integrate() -> TriangleLights:
+            return integrate_environment(
+                self.tiles,
+                EnvironmentTexels.from_radiance(self.environment_radiance(environment.map)),
+                environment.rotation,
+            )
+
+        return self.cache.get_value((self.key, "lights", environment), integrate)
+
+    def coarse_weights(
+        self, label: str, environment: EnvironmentKey, find_radiance: Callable[[str | None], F32]
+    ) -> TriangleLights:
+        """Approximate the triangles of a part of an environment by a small map.
+
+        Caches everything that rotation does not change.
+
+        Args:
+            label: name of the part. environment: with that part. find_radiance: returns the part by environment name.
+        """
+        key = self.cache_owner(environment.map), f"texels of preview {label}", environment.map
+
+        def integrate() -> TriangleLights:
+            rotatable = self.cache.get_value(
+                key,
+                lambda: EnvironmentTexels.from_radiance(halve_to_width(find_radiance(environment.map), PREVIEW_WIDTH)),
+            )
+            return integrate_environment(self.tiles, rotatable, environment.rotation)
+
+        return self.cache.transient.get_value((self.key, f"preview {label}", environment), integrate)
+
+    def cache_owner(self, name: str | None) -> str:
+        """Return the owner of cache entries of an environment: the bake, if it is the scene's own."""
+        return self.key if name is None else "environments"
+
+    @cached_property
+    def shadow_ray_directions(self) -> Shaped[F32, "M 3"]:
+        """Directions of the baked shadow rays."""
+        return read_shadow_ray_directions(self.store)
+
+    @cached_property
+    def tiles(self) -> Tiles:
+        """Spherical tiles of the lights."""
+        return read_tiles(self.store)
+
+    @property
+    def indirect(self) -> IndirectSolver | None:
+        """Indirect illumination: none was baked."""
+        return None
+
+    def samples(self, view: View, material: int, cache: Cache) -> Samples:
+        """Return all samples of a material. See `FixedViewTransfer`."""
+        return MaterialSamples(view, material, self.local, cache, (self.key, *view.sample_key(material)))
+
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
+    ) -> SelectedSamples:
+        """Select samples of a material. See `FixedViewTransfer`."""
+        shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
+        visible = np.asarray(view.read_rows("visibility", material, sample_indices), np.uint8)
+        return SelectedSamples(replace(shading_points, visible=visible), self.local)
+
+    def unoccluded_samples(self, points: SurfacePoints) -> Samples:
+        """Return points to which nothing occludes the environment. See `FixedViewTransfer`."""
+        visible = np.packbits(points.normal @ self.shadow_ray_directions.T > 0, axis=1, bitorder="little")
+        return SelectedSamples(ShadingPoints(points, points.normal, visible), self.local)
+
+    def incident_light(
+        self,
+        samples: Samples,
+        light: Illumination,
+        quality: LightQuality = LightQuality.EXACT,
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> LightsAndPoints:
+        """Return the incident light at samples. See `FixedViewTransfer`."""
+        lights = self.direct_lights(light, quality)
+        receivers = samples.receivers(is_lit=lights.num_lights > 0)
+        indirect = self._indirect_rays(samples, light, quality, is_canceled) if light.paths.has_indirect else ()
+        return lights, replace(receivers, rays=(*indirect, *samples.local_rays(light, receivers.points)))
+
+    def _indirect_rays(
+        self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
+    ) -> tuple[RayList, ...]:
+        """Return the rays that carry indirect illumination to samples: none was baked."""
+        return ()
+
+    def downsampled(self, view_name: str, step: int) -> Self:
+        """Return one view with 1 / step² of its pixels. Its images are not saved: its key is no folder."""
+        index = self.views[view_name].index
+        store, key = DownsampledStore(self.store, index, step), f"{self.key}/{step}"
+        return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.cache, key)})
+
+    def is_emissive_at(self, view: View, material: int) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for samples of an emissive material that are visible from an emissive side."""
+        return self.local.is_emissive_at(
+            material, view.ray_origins(view.rows(material)), view.surface_points(material).position
+        )
+
+    def background_in(self, environment: EnvironmentKey, view: View) -> Shaped[NDArray[np.float32], "n 3"]:
+        """Return the radiance of a view's background samples."""
+        if environment == BAKED_ENVIRONMENT:
+            return view.background()
+        return self.environment_along(environment, view.background_directions())
+
+    def environment_along(
+        self, environment: EnvironmentKey, directions: Shaped[NDArray[np.float64], "n 3"], blur: float = 0
+    ) -> Shaped[F32, "n 3"]:
+        """Return the radiance of an environment in unit directions, blurred by `blur` degrees."""
+        radiance = self.environment_map(environment.map, blur)
+        return lookup(radiance, rotate_about_y(directions, -environment.rotation).astype(np.float32))
+
+    def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""
+        return self._prefiltered_map(name, blur) if blur else self.environment_radiance(name)
+
+    def _prefiltered_map(self, name: str | None, degrees: float) -> F32:
+        owner = self.cache_owner(name)
+
+        def downsample() -> F32:
+            return downsampled(self.environment_radiance(name))
+
+        def prefilter() -> F32:
+            return prefiltered(self.cache.get_value((owner, "downsampled environment", name), downsample), degrees)
+
+        return self.cache.transient.get_value((owner, "blurred environment", name, degrees), prefilter)
+
+
+@dataclass(frozen=True)
+class MaterialSamples:
+    """All samples of a material, read when they are lit.
+
+    Attributes:
+        view: the view. material: index of the material. local: casts the shadows of local lights.
+        cache: cache of these shadows. key: key of the samples in it.
+    """
+
+    view: View
+    material: int
+    local: LocalLights
+    cache: Cache
+    key: tuple[Hashable, ...]
+
+    num_bytes = 0
+
+    def receivers(self, *, is_lit: bool) -> ShadingPoints:
+        """Read the samples without rays. is_lit: with the visibility of the environment."""
+        return self.view.receivers(self.material, is_lit=is_lit)
+
+    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays:
+        """Read the gather rays, without light; missing ones are traced."""
+        rows = self.view.rows(self.material)
+        if rows.start < rows.stop:
+            self.view.trace_gather_rays(self.material, is_canceled)
+        return self.view.gather_rays(self.material)
+
+    @property
+    def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """The virtual lights that the samples see in planar mirrors."""
+        return self.view.mirror_lights(self.material)
+
+    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights, with cached shadows. points: the samples"""
+
+        def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
+            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
+            return self.cache.get(
+                (*self.key, "shadows", geometry), ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points)
+            )
+
+        return self.local.rays_to(light, points, cached_shadows)
+
+
+@dataclass(frozen=True)
+class SelectedSamples:
+    """Some points, read once to be lit quickly.
+
+    Attributes:
+        points: without rays. local: casts the shadows of local lights.
+        stored_rays: their gather rays without light; None for none.
+        mirror_visibility: the virtual lights that they see in planar mirrors; None for none.
+    """
+
+    points: ShadingPoints
+    local: LocalLights
+    stored_rays: GatherRays | None = None
+    mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory in use."""
+        points, hit_bytes = self.points, 0 if self.stored_rays is None else self.stored_rays.gather_hits.nbytes
+        return int(
+            2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
+        )
+
+    def receivers(self, *, is_lit: bool) -> ShadingPoints:
+        """Return the points without rays."""
+        return self.points
+
+    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
+        """Return the gather rays, without light."""
+        return self.stored_rays
+
+    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights; shadows are traced."""
+        return self.local.rays_to(light, points)
+
+
+def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:
+    """Return the environment triangles for direct illumination; local lights are separate."""
+    if not light.has_direct_environment:
+        return lights.empty()
+    if light.environment_gain == (1.0, 1.0, 1.0):
+        return lights
+    return replace(lights, irradiance=lights.irradiance * np.array(light.environment_gain, np.float32))
+
+
+def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """Read the fields of `BakedFixedViews` from a store.
+
+    Args:
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+    Raises:
+        StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
+    """
+    fields = read_light_fields(store, key, cache)
+    views = (open_view(store, k, cache, key) for k in range(len(store.attributes["views"])))
+    return {**fields, "views": {view.name: view for view in views}}
+
+
+def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """Read the fields that do not depend on views.
+
+    Args:
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+    Raises:
+        StoreError: its description is invalid.
+    """
+    attributes = store.attributes
+    try:
+        return {
+            "cache": cache,
+            "key": key,
+            "store": store,
+            "scene_id": attributes["scene"],
+            "method": attributes["method"],
+            "num_lights": attributes["num_lights"],
+            "default_look": complete({}, attributes["look"]),
+            "material_names": tuple(attributes["materials"]),
+            "views": {},
+        }
+    except (KeyError, TypeError, IndexError, ParameterError) as error:
+        raise StoreError(f"the store's description is invalid ({error}); delete the bake and bake again") from error

@@ -1,0 +1,126 @@
+"""Bakes of fixed views with direct and indirect illumination, opened for freezing and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
+from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
+from relume.live.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples, read_fields
+from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights
+from relume.live.opened.patch_direct_light import DirectPatchLight
+from relume.live.opened.planar_mirror_light import MirrorLightTransfer
+from relume.live.opened.retrace import NormalRetracer
+from relume.live.opened.stored_patches import read_patches
+from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
+from relume.radiosity.normal_mapped_patches import normal_mapped_patches
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.store.bake_protocol import StoreReader
+from relume.transport.shading_points import RayList
+from relume.views.view import View
+
+
+@dataclass(frozen=True)
+class BakedIndirectViews(BakedFixedViews):
+    """A bake of fixed views with direct and indirect illumination.
+
+    Attributes:
+        patches: surface patches with indirect light.
+        mirror_lights: virtual lights of planar mirrors; None if there are none.
+    """
+
+    patches: PatchLight
+    mirror_lights: MirrorLights | None
+
+    axes = BakedFixedViews.axes | {EditAxis.BOUNCES}
+
+    @classmethod
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
+        """Open a store with patches. See `BakedFixedViews`."""
+        fields = read_fields(store, key, cache)
+        return cls(**fields, patches=read_patches(store), mirror_lights=read_mirror_lights(store))
+
+    @cached_property
+    def indirect(self) -> IndirectSolver:
+        """Solver for the light of patches at samples, which see virtual lights in planar mirrors as well."""
+        return self._solver(self.mirror_light)
+
+    @cached_property
+    def indirect_at_probes(self) -> IndirectSolver:
+        """Solver for the light of patches at probes, which store no visibility of virtual lights."""
+        return self._solver(None)
+
+    def _solver(self, mirror_light: MirrorLightTransfer | None) -> IndirectSolver:
+        direct_light = DirectPatchLight(self.patches, *self._direct_light_args, self.harmonic)
+        return IndirectSolver(direct_light, self._normal_mapped_direct_light, mirror_light, self.cache, self.key)
+
+    def _normal_mapped_direct_light(self, normals: Normals, is_canceled: Callable[[], bool]) -> DirectPatchLight:
+        """Return the direct light of patches with normal-map overrides: one image per material, None for none."""
+        key = self.key, "patches with mapped normals", normals
+        patches = self.cache.get_value(
+            key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled)
+        )
+        return DirectPatchLight(patches, *self._direct_light_args, normal_overrides=(normals,))
+
+    @property
+    def _direct_light_args(self) -> tuple[LocalLights, FindLights, Cache, str]:
+        """Arguments of `DirectPatchLight`."""
+        return self.local, self.environment_lights, self.cache, self.key
+
+    @cached_property
+    def mirror_light(self) -> MirrorLightTransfer | None:
+        """Light of planar mirrors in any look."""
+        if self.mirror_lights is None:
+            return None
+        return MirrorLightTransfer(self.mirror_lights, self.patches, self.environment_lights, self.cache, self.key)
+
+    @cached_property
+    def tracer(self) -> NormalRetracer:
+        """Tracer for normals that were not baked."""
+        return NormalRetracer(self.store, self.local, self.mirror_lights)
+
+    @cached_property
+    def harmonic(self) -> HarmonicLight | None:
+        """Spherical-harmonic transfer to probes and patches, if baked."""
+        return read_harmonic_light(self.store, self.patches)
+
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
+    ) -> SelectedSamples:
+        """Select samples of a material. See `FixedViewTransfer`."""
+        samples = super().selected_samples(view, material, sample_indices, has_indirect=has_indirect)
+        if not has_indirect:
+            return samples
+        mirror_visibility = (
+            None
+            if self.mirror_lights is None
+            else np.asarray(view.read_rows("mirror_lights", material, sample_indices), np.uint8)
+        )
+        gather_rays = view.subset_rays(material, sample_indices)
+        return replace(samples, stored_rays=gather_rays, mirror_visibility=mirror_visibility)
+
+    def _indirect_rays(
+        self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
+    ) -> tuple[RayList, ...]:
+        """Return the rays from patches, and those from virtual lights in planar mirrors."""
+        gather_rays = samples.gather_rays(is_canceled)
+        if gather_rays is None:
+            return ()
+        # in a preview, tracing overridden normals takes too long
+        reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
+        rays = replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled))
+        mirror_light = self.mirror_light
+        if mirror_light is None or not mirror_light.is_in(light):
+            return (rays,)
+        assert samples.mirror_visibility is not None  # stored with the gather rays
+        return rays, mirror_light.virtual_lights(light).rays(samples.mirror_visibility)

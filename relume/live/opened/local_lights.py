@@ -1,0 +1,192 @@
+"""Local lights over a baked store: their shadows are traced on demand, and cached by the caller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.core.cache import Cache
+from relume.lights.light_sampling import LightStrata
+from relume.lights.local_lights import (
+    LightTriangles,
+    LocalLight,
+    emitter_geometry,
+    make_light_strata,
+    prepare_local_lights,
+)
+from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.look import LightGeometry
+from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
+from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
+from relume.raytrace.moving_light import MovingLight, trace_moving_light
+from relume.raytrace.scene_buffers import is_front, ray_epsilon
+from relume.raytrace.surface_points import SurfacePoints
+from relume.store.bake_protocol import StoreReader
+from relume.transport.shading_points import LocalRays
+
+F32 = NDArray[np.float32]
+
+SAMPLES = 64  # of a rectangle, per view sample
+MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # mesh lights have more samples, if the scene has few emissive materials
+PREVIEW_SAMPLES = 4  # during an edit of the light
+_ONES = np.ones(3, np.float32)
+
+
+@dataclass(frozen=True)
+class ShadowCache:
+    """Visibility of a light's samples, as in `LocalRays.visible`."""
+
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory in use."""
+        return self.visible.nbytes
+
+
+class LocalLights:
+    """Triangles of a store, and lights among them; shared by all images of the bake.
+
+    Args:
+        key: key of the bake in `cache`.
+    """
+
+    def __init__(self, store: StoreReader, cache: Cache, key: str) -> None:
+        self._store, self._cache, self._key = store, cache, key
+
+    @cached_property
+    def positions(self) -> Shaped[F32, "vertices 3"]:
+        """Vertex positions of the scene, meters."""
+        return np.asarray(self._store.read("scene/positions"), np.float32)
+
+    @cached_property
+    def faces(self) -> Shaped[NDArray[np.uint32], "triangles 3"]:
+        """Vertex indices of the triangles."""
+        return np.asarray(self._store.read("scene/faces"), np.uint32)
+
+    @property
+    def has_alpha_tested_surfaces(self) -> bool:
+        """True if some triangles are alpha-tested."""
+        return has_alpha_tested_surfaces(self._store)
+
+    @cached_property
+    def embree(self) -> EmbreeScene:
+        """Acceleration structure of the triangles."""
+        return EmbreeScene.build(self.positions, self.faces, read_alpha_test(self._store, self.positions, self.faces))
+
+    @cached_property
+    def _ray_offset(self) -> float:
+        return ray_epsilon(self.positions)
+
+    def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
+        """Return the number of samples of a light, given that of a rectangle; see `make_light_strata`.
+
+        A mesh has more: parts of it are often occluded, and its housing is close.
+        """
+        lights = self._store.attributes["look"]["lights"].values()
+        has_few_meshes = sum(light["kind"] == "mesh" for light in lights) <= MAX_FINE_MESHES
+        return rectangle_samples * (MESH_SAMPLE_FACTOR if geometry.kind == "mesh" and has_few_meshes else 1)
+
+    def rays_to(
+        self,
+        light: Illumination,
+        points: SurfacePoints,
+        find_shadows: Callable[[LightGeometry, SurfacePoints], ShadowCache] | None = None,
+        *,
+        is_coarse: bool = False,
+    ) -> list[LocalRays]:
+        """Return the direct illumination of points by local lights, as rays.
+
+        Args:
+            light: all light of the image. points: receivers.
+            find_shadows: looks shadows up in a cache; None: they are traced.
+            is_coarse: without `find_shadows`, for low-degree bases: every light has `SAMPLES`.
+        """
+        if not light.paths.direct:
+            return []
+        rays = []
+        for geometry, gain in light.local:
+            num_samples, emitter = SAMPLES if is_coarse else self.num_samples(geometry), emitter_geometry(geometry)
+            visible = (
+                self.trace(emitter, points, num_samples)
+                if find_shadows is None
+                else find_shadows(emitter, points).visible
+            )
+            rays.append(LocalRays(*self.sample_light(geometry, num_samples), np.array(gain, np.float32), visible))
+        return rays
+
+    def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
+        """Preview a light of unit emission at points, with few samples if it has an extent."""
+        return trace_moving_light(self.embree, self._ray_offset, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
+
+    def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
+        """Return rays of a previewed light, for directional terms. visible: `MovingLight.visible`"""
+        return LocalRays(
+            *self.sample_light(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), visible
+        )
+
+    def unoccluded_rays(self, geometry: LightGeometry, points: SurfacePoints) -> LocalRays:
+        """Return unoccluded light of unit emission at points, as rays."""
+        light, strata = self.sample_light(geometry, SAMPLES)
+        visible = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
+        return LocalRays(light, strata, _ONES, visible)
+
+    def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
+        """Return the unoccluded irradiance of points from a light of unit emission."""
+        rays = self.unoccluded_rays(geometry, points)
+        return compute_irradiance(rays.light, rays.strata, points, rays.visible)
+
+    def shadows(self, geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
+        """Trace the shadows of a light."""
+        return ShadowCache(self.trace(geometry, points, self.num_samples(geometry)))
+
+    def is_emissive_at(
+        self, material: int, camera_position: Shaped[F32, "*cameras 3"], position: Shaped[F32, "n 3"]
+    ) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for points of an emissive material that are visible from an emissive side.
+
+        Args:
+            material: its index. camera_position: camera position of each point, or one for all.
+            position: position of the points.
+        """
+        if self._is_two_sided(material):
+            return np.ones(len(position), np.bool_)
+        return is_front(self.embree, self.positions, self.faces, camera_position, position)
+
+    def trace(
+        self, geometry: LightGeometry, points: SurfacePoints, num_samples: int
+    ) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Trace the visibility of a light's samples from points; see `LocalRays.visible`.
+
+        Args:
+            geometry: geometry of the light. points: receivers. num_samples: from `LocalLights.num_samples`.
+        """
+        return trace_light_visibility(self.embree, self._ray_offset, *self.sample_light(geometry, num_samples), points)
+
+    def sample_light(self, geometry: LightGeometry, rectangle_samples: int) -> tuple[LocalLight, LightStrata]:
+        """Build a light and its samples; see `make_light_strata`."""
+        light = self._light(geometry)
+        return light, make_light_strata(light, rectangle_samples)
+
+    def _light(self, geometry: LightGeometry) -> LocalLight:
+        return self._cache.get_value((self._key, "local light", geometry), lambda: self._build_light(geometry))
+
+    def _build_light(self, geometry: LightGeometry) -> LocalLight:
+        if geometry.kind != "mesh":
+            return prepare_local_lights(geometry)
+        material = list(self._store.attributes["materials"]).index(geometry.material)
+        face_mask = self._store.read("scene/face_material") == material
+        face_emission = np.ones(np.count_nonzero(face_mask), np.float32)
+        if self._store.attributes.get("has_emission_images"):
+            face_emission = self._store.read("scene/face_emission")[face_mask]
+        corners = self.positions[self.faces[face_mask]]
+        return prepare_local_lights(geometry, LightTriangles(corners, face_emission, self._is_two_sided(material)))
+
+    def _is_two_sided(self, material: int) -> bool:
+        return bool(self._store.attributes["double_sided"][material])

@@ -1,0 +1,97 @@
+"""Rays of a baked store, traced again for overridden normals; shared by all images of the bake."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.camera.planar_mirrors import lights_visible_in_mirrors
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.live.opened.local_lights import LocalLights
+from relume.methods.mirror_lights import MirrorLights
+from relume.methods.patch_layout import read_tree
+from relume.methods.store_layout import read_shadow_ray_directions
+from relume.patches.gather_hits import trace_gather_rays
+from relume.patches.patch_kdtree import PatchTree
+from relume.raytrace.gather_rays import RayPattern
+from relume.raytrace.scene_buffers import SceneBuffers, ray_epsilon
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility import trace_visibility
+from relume.store.bake_protocol import StoreReader
+
+F32 = NDArray[np.float32]
+
+_POINTS_PER_BATCH = 4096
+
+
+class NormalRetracer:
+    """Traces the rays of a store again; a `relume.views.map_override_store.RayTracer`.
+
+    Args:
+        local: with the acceleration structure. mirror_lights: virtual lights of planar mirrors, if any.
+    """
+
+    def __init__(self, store: StoreReader, local: LocalLights, mirror_lights: MirrorLights | None) -> None:
+        self._store, self._local, self._mirror_lights = store, local, mirror_lights
+
+    def check(self) -> None:
+        """Raise StoreError if the store lacks data for tracing its rays."""
+        if "gather_rays" in self._store.attributes:
+            _ = self._geometry
+
+    def visibility(
+        self, points: SurfacePoints, baked_normals: Shaped[F32, "n 3"], baked_bits: Shaped[NDArray[np.uint8], "n bytes"]
+    ) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Update light visibility: traces lights that rise above the horizon, clears those that set.
+
+        Args:
+            points: with the new normals. baked_normals, baked_bits: normals and visibility of the bake.
+        """
+        directions = read_shadow_ray_directions(self._store)
+        visible = trace_visibility(
+            self._local.embree, points.position, points.normal, directions, points.alpha_sample, baked_normals
+        ).visible
+        for start in range(0, len(visible), _POINTS_PER_BATCH):
+            batch = slice(start, start + _POINTS_PER_BATCH)
+            above = np.packbits(points.normal[batch] @ directions.T > 0, axis=1, bitorder="little")
+            visible[batch] |= baked_bits[batch] & above
+        return visible
+
+    def gather_hits(
+        self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
+    ) -> Shaped[NDArray[np.uint16], "n rays"]:
+        """Return the patches that gather rays hit.
+
+        Args:
+            points: with the new normals. wo: view directions. pattern: pattern of the rays.
+        """
+        return trace_gather_rays(self._geometry, self._tree, points, wo, pattern).patch
+
+    def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Trace the lights that points see in planar mirrors. points: with the new normals"""
+        assert self._mirror_lights is not None  # callers have read them from the store
+        return lights_visible_in_mirrors(
+            self._geometry, self._mirror_lights.mirrors, points, self._mirror_lights.direction
+        ).visible
+
+    @cached_property
+    def _tree(self) -> PatchTree:
+        return read_tree(self._store)
+
+    @cached_property
+    def _geometry(self) -> SceneBuffers:
+        """Triangles for rays between surfaces: without normals and textures."""
+        store, positions, faces = self._store, self._local.positions, self._local.faces
+        try:
+            mesh, material = (store.read(f"scene/{name}") for name in ("face_mesh", "face_material"))
+        except ChunkDamagedError:
+            raise
+        except StoreError:
+            raise StoreError("this bake is too old to show normal map overrides; bake the scene again") from None
+        normals, tangents, uvs = (np.empty((0, k), np.float32) for k in (3, 4, 2))
+        return SceneBuffers(
+            positions, normals, tangents, uvs, faces, material, mesh, self._local.embree, ray_epsilon(positions)
+        )

@@ -1,0 +1,237 @@
+"""Static views: a fixed view traced in memory when a free camera stops.
+
+Light triangles, patches and their visibility are in the free-camera bake already. Only the view-dependent part is
+traced, by the stages of the method `gather`: view samples, their visible lights, their gather hits. A static view is as
+exact as `gather`, and shares all results computed from the bake's light.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import IO, Any
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.core.errors import CancelledError
+from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.opened.fixed_views import SelectedSamples
+from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights
+from relume.methods.gather import GatherMethod
+from relume.operators.image_cache import ImageFiles
+from relume.scene.custom_camera import with_cameras
+from relume.scene.model import Camera, Scene
+from relume.store.bake_protocol import Recipe, StoreReader, Task
+from relume.views.view import View, open_view
+
+# a fifth of a bake's rays, both lattices of Fibonacci size; their light is shared with more neighbors
+_RAYS, _GLOSSY_RAYS, _NUM_TENT_PASSES = 123, 34, 2
+_ROWS_PER_TASK = 4096  # at most half a second of work, which bounds the time to cancel
+_SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the stage between these is in the bake
+
+
+class ExtendedStore:
+    """A read-only store extended in memory by the arrays of one view, with index 0; a `TaskStore`."""
+
+    def __init__(self, store: StoreReader, attributes: Mapping[str, Any]) -> None:
+        self._store, self._attributes = store, {**store.attributes, **attributes}
+        self.arrays: dict[str, NDArray[Any]] = {}
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """Attributes of the store, overridden by those of the view."""
+        return self._attributes
+
+    def shape(self, path: str) -> tuple[int, ...]:
+        """Shape of an array."""
+        return self.arrays[path].shape if path in self.arrays else self._store.shape(path)
+
+    def scratch(self) -> IO[bytes]:
+        """Return a scratch file in memory, where the whole view is held."""
+        return io.BytesIO()
+
+    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """Rows [start, stop) of the array at a path."""
+        array = self.arrays.get(path)
+        return self._store.read(path, start, stop) if array is None else array[start:stop]
+
+
+@dataclass(frozen=True)
+class StaticView(BakedIndirectViews):
+    """One static view over a free-camera bake, opened like a fixed view; shares everything that is not of the view.
+
+    Attributes:
+        light_transport: the light of the bake. reflects: True if gather rays were traced; else direct illumination
+            only.
+    """
+
+    light_transport: BakedIndirectViews
+    reflects: bool
+
+    @classmethod
+    def from_bake(cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool) -> StaticView:
+        """Open the view of an extended store.
+
+        Args:
+            light_transport: the light of the bake. store: over the bake's. reflects: True if it has gather rays.
+        """
+        view = open_view(store, 0, light_transport.cache, light_transport.key)
+        bake_fields = {
+            bake_field.name: getattr(light_transport, bake_field.name) for bake_field in fields(BakedIndirectViews)
+        }
+        return cls(
+            **{**bake_fields, "store": store, "views": {view.name: view}},
+            light_transport=light_transport,
+            reflects=reflects,
+        )
+
+    @property
+    def derived(self) -> ImageFiles:
+        """Images of the default look: bounded like those of other looks, since the number of cameras is not."""
+        return self.edited
+
+    @cached_property
+    def local(self) -> LocalLights:
+        """Local lights of the scene."""
+        return self.light_transport.local
+
+    @cached_property
+    def indirect(self) -> IndirectSolver:
+        """Solver for the outgoing light of the patches."""
+        return self.light_transport.indirect
+
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
+    ) -> SelectedSamples:
+        """Select samples of a material, with gather rays if traced. See `FixedViewTransfer`."""
+        has_rays = has_indirect and self.reflects
+        return super().selected_samples(view, material, sample_indices, has_indirect=has_rays)
+
+
+class StaticTracing:
+    """A static view that is being traced; after cancellation it resumes from there.
+
+    Args:
+        method: with these stages. scene: with the camera added. recipe: recipe of its view.
+        store: for the view's arrays.
+    """
+
+    def __init__(self, method: GatherMethod, scene: Scene, recipe: Recipe, store: ExtendedStore) -> None:
+        self._method, self._scene, self._recipe, self.store = method, scene, recipe, store
+        sampling = Task(_SAMPLE_STAGE, 1, recipe.views[0], 0, 0)
+        sampled_arrays = method.compute(scene, recipe, sampling, store).arrays
+        store.arrays.update({path: np.asarray(rows) for path, rows in sampled_arrays.items()})
+        for stage in (_SHADOW_STAGE, _HIT_STAGE):
+            view_specs = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
+            store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in view_specs})
+        # includes the seeds of local lights' shadows, which do not need gather rays
+        seeds = store.arrays["views/0/seed"]
+        seeds[:] = np.arange(len(seeds))
+        shadow_tasks, hit_tasks = (
+            list(_split_tasks(method.tasks(k, scene, recipe, store))) for k in (_SHADOW_STAGE, _HIT_STAGE)
+        )
+        self._tasks, self._num_shadow_tasks = shadow_tasks + hit_tasks, len(shadow_tasks)
+        self._num_done, self._lock = 0, threading.Lock()
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory in use."""
+        return sum(array.nbytes for array in self.store.arrays.values())
+
+    def complete_tracing(self, reflects: bool, progress: ProgressCallback, is_canceled: CancelCheck) -> None:
+        """Trace the remaining tasks.
+
+        Args:
+            reflects: includes gather rays, which take most of the time.
+            progress: called with the completed fraction. is_canceled: polled.
+        Raises:
+            CancelledError: `is_canceled` returned True.
+        """
+        num_tasks = len(self._tasks) if reflects else self._num_shadow_tasks
+        while True:
+            if is_canceled():
+                raise CancelledError("the static view was canceled")
+            progress(min(self._num_done / num_tasks, 1.0) if num_tasks else 1.0)
+            with self._lock:  # per task, so that concurrent callers share the work
+                if self._num_done >= num_tasks:
+                    return
+                self._trace(self._tasks[self._num_done])
+                self._num_done += 1
+
+    def _trace(self, task: Task) -> None:
+        arrays = self.store.arrays
+        for path, rows in self._method.compute(self._scene, self._recipe, task, self.store).arrays.items():
+            if path in arrays:
+                arrays[path][task.start : task.stop] = rows
+
+
+class StaticViewBuilder:
+    """Traces static views of one free-camera bake.
+
+    Args:
+        light_transport: the light of the bake. scene: that was baked.
+    """
+
+    def __init__(self, light_transport: BakedIndirectViews, scene: Scene) -> None:
+        self._light_transport, self._scene = light_transport, scene
+        self._smooth = GatherMethod(_RAYS, _GLOSSY_RAYS, num_tent_passes=_NUM_TENT_PASSES)
+        self._sparse = GatherMethod(_RAYS, _GLOSSY_RAYS, num_tent_passes=_NUM_TENT_PASSES, smooths_edges=False)
+
+    def make_static_view(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        reflects: bool,
+        progress: ProgressCallback,
+        is_canceled: CancelCheck,
+        *,
+        smooths_edges: bool = True,
+    ) -> StaticView:
+        """Trace a static view, as far as it is not cached.
+
+        Args:
+            camera: the pose. size: width and height, pixels. reflects: includes indirect illumination.
+            progress: called with the completed fraction. is_canceled: polled.
+            smooths_edges: whether pixels on edges have several samples; else each has one at its center.
+        Raises:
+            CancelledError: `is_canceled` returned True.
+            MemoryBudgetError: the view exceeds the memory budget.
+        """
+        cache, name = self._light_transport.cache.transient, _view_name(camera, size, smooths_edges)
+        key = self._light_transport.key, "static view", name
+        tracing = cache.get_cached(key, StaticTracing)
+        if tracing is None:
+            new_tracing = self._start_tracing(
+                self._smooth if smooths_edges else self._sparse, replace(camera, name=name), size
+            )
+            tracing = cache.get(key, StaticTracing, new_tracing.num_bytes, lambda: new_tracing)
+        tracing.complete_tracing(reflects, progress, is_canceled)
+        return StaticView.from_bake(self._light_transport, tracing.store, reflects)
+
+    def _start_tracing(self, method: GatherMethod, camera: Camera, size: tuple[int, int]) -> StaticTracing:
+        recipe = Recipe(method.name, (camera.name,), size, self._light_transport.num_lights)
+        scene = with_cameras(self._scene, [camera])
+        store = ExtendedStore(self._light_transport.store, method.attributes(scene, recipe))
+        return StaticTracing(method, scene, recipe, store)
+
+
+def _split_tasks(tasks: Iterable[Task]) -> Iterator[Task]:
+    """Split the view's tasks so that each is short enough for a cancellation to wait for."""
+    for task in tasks:
+        if task.group:
+            for start in range(task.start, task.stop, _ROWS_PER_TASK):
+                yield replace(task, start=start, stop=min(start + _ROWS_PER_TASK, task.stop))
+
+
+def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool) -> str:
+    """Return a unique name of a camera's static view, which identifies its images in the cache."""
+    identity = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges)).encode()
+    return f"{camera.name} {hashlib.sha256(identity).hexdigest()[:16]}"

@@ -1,1 +1,0 @@
-"""Opened bakes of fixed cameras: transfer for images from the arrays of a store."""

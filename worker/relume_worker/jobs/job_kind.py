@@ -1,0 +1,177 @@
+"""Interface of a kind of job, and what all kinds have in common.
+
+To add a kind, write a subclass, and pass it to the `JobService`.
+"""
+
+from __future__ import annotations
+
+import shutil
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Protocol
+
+from relume_worker.database.models import JobRow
+from relume_worker.jobs.job import ACTIVE, UNREADABLE, Job, JobFilter, NotReadyError, Request, new_id, read_row
+from relume_worker.jobs.job_ledger import JobLedger
+from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.step import RunStep
+from relume_worker.jobs.step_timer import StepTimer
+
+
+class JobHost(Protocol):
+    """Part of the service that a kind needs, see `relume_worker.jobs.job_service.JobService`."""
+
+    @property
+    def ledger(self) -> JobLedger: ...
+    @property
+    def run_step(self) -> RunStep: ...
+    @property
+    def is_closing(self) -> bool: ...
+    def add_kind(self, kind: Any) -> None: ...
+    def wake(self) -> None: ...
+    def timer(self, identity: str) -> StepTimer | None: ...
+
+
+class JobKind(ABC, Generic[Request]):
+    """Jobs of one kind; their files are in `folder`/<id>/.
+
+    A subclass defines its name, the number of steps, the priority, `run`, and a placeholder of requests that cannot be
+    read. Finished steps must be files, because another process may resume the job: after a kill, an update, or a
+    takeover.
+    """
+
+    name: ClassVar[str]
+    placeholder: Request
+    resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
+    """States from which a job can be resumed: its files are still there."""
+
+    def __init__(self, service: JobHost, folder: Path) -> None:
+        """
+        Args:
+            service: runs the jobs. folder: created if missing.
+        """
+        self._service, self.folder = service, folder
+        service.add_kind(self)
+
+    @abstractmethod
+    def steps(self, request: Request) -> int:
+        """Number of steps of a request, at least one."""
+
+    @abstractmethod
+    def is_first(self, request: Request) -> bool:
+        """True if somebody waits for the job: small ones."""
+
+    @abstractmethod
+    def run(self, run: JobRun[Request]) -> None:
+        """Run the missing steps of a job. Raises CancelledError: the job is no longer wanted."""
+
+    def step_s(self, request: Request) -> float | None:
+        """Seconds per step of earlier requests like this; None if unknown."""
+        return None
+
+    def on_failed(self, job: Job[Request]) -> None:
+        """Called after the row has failed, by the owner of the lease; by default files are kept."""
+
+    def on_ready(self, job: Job[Request]) -> None:
+        """Called after the row is ready, by the owner of the lease; by default files are kept."""
+
+    def submit(
+        self,
+        request: Request,
+        client: str = "",
+        prepare: Callable[[Path], object] | None = None,
+        identity: str | None = None,
+    ) -> str:
+        """Queue a validated request.
+
+        Args:
+            request: body of the call. client: caller; clients are scheduled fairly.
+            prepare: writes the job's inputs into its folder; quick.
+            identity: from `new_id`, if the caller needs the id before the job can start.
+        Returns:
+            The id of the job.
+        Raises:
+            BusyError, QuotaError: the limit of all jobs, or of this client, is reached.
+        """
+        identity = identity or new_id()
+        folder = self.folder / identity
+
+        def prepare_folder() -> None:
+            if prepare is not None:
+                folder.mkdir(parents=True)
+                prepare(folder)
+
+        text, is_first = request.model_dump_json(), self.is_first(request)
+        row = JobRow(id=identity, kind=self.name, request=text, client=client, is_first=is_first)
+        self._service.ledger.add(row, prepare_folder)
+        self._service.wake()
+        return identity
+
+    def get(self, identity: str) -> Job[Request]:
+        """Return a job. Raises NotFoundError."""
+        return self.job(self._service.ledger.get(self.name, identity))
+
+    def job(self, row: JobRow) -> Job[Request]:
+        """Return the job of a row."""
+        request, state, problem = read_row(row, self.placeholder)
+        total, timer = self.steps(request), self._service.timer(row.id) if row.state == "running" else None
+        progress = min(1.0, (row.done + (timer.fraction if timer is not None else 0.0)) / total)
+        seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
+        times = row.created, row.started, row.ended
+        return Job(row.id, request, row.client or "", state, row.done, total, progress, seconds_left, problem, *times)
+
+    def check_readable(self, job: Job[Request]) -> None:
+        """Check that the request of a job could be read. Raises NotReadyError."""
+        if job.request is self.placeholder:
+            raise NotReadyError(UNREADABLE)
+
+    def page(
+        self, job_filter: JobFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
+    ) -> list[Job[Request]]:
+        """List jobs of this kind, newest first or last.
+
+        Args:
+            job_filter: filter of the list. limit: maximum number.
+            after: time of creation and id of the job before the page; None: start with the first.
+            newest_first: order.
+        """
+        rows = self._service.ledger.page(self.name, job_filter, limit, after, newest_first=newest_first)
+        return [self.job(row) for row in rows]
+
+    def referencing(self, text: str) -> list[str]:
+        """Ids of queued and running jobs whose request contains a text, oldest first."""
+        return self._service.ledger.referencing(self.name, text)
+
+    def delete(self, identity: str) -> None:
+        """Stop a job and delete its files. Raises NotFoundError."""
+        self.get(identity)
+        self._service.ledger.delete(identity)
+        shutil.rmtree(self.folder / identity, ignore_errors=True)
+
+    def stop(self, identity: str) -> None:
+        """Stop a queued or running job; its files stay for `resume`. Raises NotFoundError."""
+        self.get(identity)
+        self._service.ledger.stop(identity)
+
+    def resume(self, identity: str) -> None:
+        """Queue a stopped or failed job again; no effect on a queued or running one.
+
+        Raises:
+            NotFoundError. NotReadyError: it is ready, or its files are deleted. BusyError, QuotaError: as `submit`.
+        """
+        if self.get(identity).state not in ACTIVE:
+            self.requeue(identity, self.resumable)
+
+    def requeue(self, identity: str, states: Sequence[str], prepare: Callable[[], object] = lambda: None) -> None:
+        """Queue a job in one of some states again.
+
+        Args:
+            identity: id of the job. states: states from which it may be queued.
+            prepare: called before it can start.
+        Raises:
+            NotReadyError: it is in another state, or its request cannot be read. BusyError, QuotaError: as `submit`.
+        """
+        self.check_readable(self.get(identity))
+        self._service.ledger.requeue(self._service.ledger.get(self.name, identity), states, prepare)
+        self._service.wake()

@@ -1,0 +1,115 @@
+"""One run of a job, by the service that has its lease."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, Generic, Protocol
+
+from relume.core.errors import CancelledError
+from relume_worker.jobs.job import Job, Request, noun
+from relume_worker.jobs.job_ledger import JobLedger
+from relume_worker.jobs.step import RunStep, Step
+from relume_worker.jobs.step_timer import StepTimer
+
+_CHECK_INTERVAL_S = 0.1
+
+
+class StepHost(Protocol):
+    """Part of the service that a run needs, see `relume_worker.jobs.job_service.JobService`."""
+
+    @property
+    def ledger(self) -> JobLedger: ...
+    @property
+    def run_step(self) -> RunStep: ...
+    @property
+    def is_closing(self) -> bool: ...
+    def num_places(self) -> int:
+        """Number of bulk steps that run at once."""
+        ...
+
+
+class JobRun(Generic[Request]):
+    """Steps of a running job, in other processes; used by `JobKind.run`.
+
+    Attributes:
+        job: state of the job when it was claimed. folder: folder of its files. timer: timer of its steps.
+    """
+
+    def __init__(
+        self, host: StepHost, kind: str, job: Job[Request], folder: Path, *, is_first: bool, step_s: float | None
+    ) -> None:
+        """
+        Args:
+            host: runs the steps. kind: name of its kind. job: state of the job. folder: folder of its files.
+            is_first: True if somebody waits for it. step_s: seconds per step of earlier jobs; None if unknown.
+        """
+        self._host, self._kind, self._is_first = host, kind, is_first
+        self.job, self.folder, self.timer = job, folder, StepTimer(step_s)
+        self._needed_until_s, self._has_failed = 0.0, False
+
+    def record(self, done: int) -> None:
+        """Record the number of finished steps; the last one is recorded when the run ends.
+
+        Raises:
+            CancelledError: the job was stopped, deleted or taken over, or the service is closing.
+        """
+        done = min(done, self.job.total - 1)
+        if self._host.is_closing or not self._host.ledger.update_leased(self.job.id, state="running", done=done):
+            raise CancelledError(f"the {noun(self._kind)} was stopped")
+
+    def is_needed(self) -> bool:
+        """True unless the job was stopped, deleted or taken over a moment ago, or the service is closing."""
+        if self._host.is_closing or self._has_failed:
+            return False
+        if time.monotonic() < self._needed_until_s:
+            return True  # steps ask thousands of times per second
+        is_needed = self._host.ledger.holds_lease(self.job.id)
+        self._needed_until_s = time.monotonic() + _CHECK_INTERVAL_S if is_needed else 0.0
+        return is_needed
+
+    def step(
+        self, kind: str, values: Mapping[str, Any], report: Callable[[float], object] = lambda fraction: None
+    ) -> Mapping[str, Any]:
+        """Run a step in another process, while the job is wanted.
+
+        Args:
+            kind: kind of the step. values: its arguments. report: called with the fraction done.
+        """
+        claim = str(self.folder), self._host.ledger.owner
+        step = Step(kind, self._is_first, values, claim, self.job.user)
+        return self._host.run_step(step, report, self.is_needed)
+
+    def timed_step(self, index: int, kind: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Run one of the steps that the job counts.
+
+        Args:
+            index: index of the step. kind: kind of the step. values: its arguments.
+        """
+        self.timer.start()
+        answer = self.step(kind, values, lambda fraction: self.timer.report(index, fraction))
+        self.timer.finish(index)
+        return answer
+
+    def timed_steps(self, kind: str, values: Mapping[int, Mapping[str, Any]], done: int) -> None:
+        """Run several steps that the job counts, as many at once as there are places for them.
+
+        Args:
+            kind: kind of the steps. values: their arguments, by index. done: number of steps that are finished already.
+        Raises:
+            The error of the first step that fails; the others are canceled.
+        """
+        with ThreadPoolExecutor(max(1, min(len(values), self._host.num_places())), "relume-steps") as threads:
+            futures = [threads.submit(self.timed_step, index, kind, each) for index, each in values.items()]
+            try:
+                for num, future in enumerate(as_completed(futures), 1):
+                    future.result()
+                    self.record(done + num)
+            except BaseException:
+                self._has_failed = True
+                raise
+            finally:
+                for future in futures:
+                    future.cancel()
