@@ -10,17 +10,16 @@ occluded: the incident light of a sample is this radiance along those of its gat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from relume.assets.environments.equirect import texel_solid_angles
-from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination
-from relume.live.fixed_camera.protocols import EditAxis, LightsAndPoints
-from relume.live.opened.fixed_views import BakedFixedViews, SampledTransfer
+from relume.live.fixed_camera.protocols import EditAxis, LightQuality, LightsAndPoints, Samples
+from relume.live.opened.fixed_views import BakedFixedViews, SelectedSamples
 from relume.methods.store_layout import SHARD_ROWS
 from relume.methods.view_stages import CHUNK_ROWS, SampledViews
 from relume.patches.gather_hits import trace_gather_rays
@@ -51,32 +50,24 @@ class FurnaceViews(BakedFixedViews):
             glow[0] = GLOW * np.einsum("h,hwc->c", row_fraction, radiance) * light.environment_gain
         return isotropic(glow)
 
-    def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
+    def incident_light(
+        self,
+        samples: Samples,
+        light: Illumination,
+        quality: LightQuality = LightQuality.EXACT,
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> LightsAndPoints:
         """Surface radiance along gather rays, without the environment."""
-        receivers = view.receivers(material, self.glow(light), is_lit=False)
-        return self.lights.empty(), receivers
+        rays = replace(samples.gather_rays(is_canceled), outgoing=self.glow(light))
+        return self.lights.empty(), replace(samples.receivers(is_lit=False), rays=(rays,))
 
-    def subset(self, view: View, material: int, sample_indices: np.ndarray, *, has_indirect: bool) -> SampledTransfer:
+    def selected_samples(
+        self, view: View, material: int, sample_indices: np.ndarray, *, has_indirect: bool
+    ) -> SelectedSamples:
         """Select a few samples for previews."""
-        return _FurnaceSamples(self, view, material, sample_indices)
-
-
-class _FurnaceSamples:
-    """A few samples of a material, shaded at once in any light."""
-
-    def __init__(self, furnace: FurnaceViews, view: View, material: int, sample_indices: np.ndarray) -> None:
-        self._furnace, self._view, self._material, self._sample_indices = furnace, view, material, sample_indices
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory of the samples."""
-        return self._sample_indices.nbytes
-
-    def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """Incident light at these samples."""
-        material_points = self._view.receivers(self._material, is_lit=False)
-        rays = self._view.gather_rays(self._material, self._furnace.glow(light)).unshared(self._sample_indices)
-        return self._furnace.lights.empty(), replace(material_points.without_light(self._sample_indices), rays=(rays,))
+        points = view.receivers(material, is_lit=False).without_light(sample_indices)
+        rays = view.gather_rays(material).unshared(sample_indices)
+        return SelectedSamples(points, self.local, rays)
 
 
 class FurnaceMethod:

@@ -11,10 +11,10 @@ from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.live.fixed_camera.illumination import illumination_from_look
-from relume.live.fixed_camera.protocols import EditAxis
+from relume.live.fixed_camera.protocols import EditAxis, LightQuality
 from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.radiosity.highlight_transport import outgoing_in_highlights
-from relume.radiosity.solve_bounces import solve_indirect
+from relume.radiosity.solve_bounces import solve_bounces
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.outgoing_patch_light import SIDE
 from relume.transport.projector import Projector
@@ -178,17 +178,15 @@ def gather_incident_light(transfer, view: View, index, look):
     light = illumination_from_look(look, transfer.material_names, has_bounces=EditAxis.BOUNCES in transfer.axes)
     gain = np.array(look.environment.gain, np.float32)
     if EditAxis.LIGHT not in transfer.axes:  # a method with its own light
-        return transfer.incident_light(
-            view, index, light._replace(environment_gain=look.environment.gain), transfer.cache
-        )
-    lights, indirect = transfer.light_of_environment(look.environment.key), None
+        samples = transfer.samples(view, index, transfer.cache)
+        return transfer.incident_light(samples, light._replace(environment_gain=look.environment.gain))
+    lights, indirect = transfer.environment_lights(look.environment.key, LightQuality.EXACT), None
     if light.paths.has_indirect:
         reflecting = transfer.patches.reflectance_operator(light.reflectances)
         patch_light = DirectPatchLight(
             transfer.patches,
             transfer.local,
-            transfer.light_of_environment,
-            transfer.preview_light_of_environment,
+            transfer.environment_lights,
             transfer.cache,
             transfer.key,
             transfer.harmonic,
@@ -201,12 +199,13 @@ def gather_incident_light(transfer, view: View, index, look):
             outgoing_in_highlights(transfer.patches, patch_lobes, patch_light.direct(scaled_light, patch_lobes.rows)),
         )
         bounces = light.paths.first, light.paths.last
-        indirect = solve_indirect(transfer.patches, reflecting, incident, *bounces, lobe_light).outgoing_light(
+        indirect = solve_bounces(transfer.patches, reflecting, incident, *bounces, lobe_light).outgoing_light(
             transfer.patches
         )
     local = transfer.local.rays_to(light, view.surface_points(index))
     direct_lights = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.empty()
-    return direct_lights, view.receivers(index, indirect, local, is_lit=light.paths.direct)
+    gather_rays = () if indirect is None else (replace(view.gather_rays(index), outgoing=indirect),)
+    return direct_lights, replace(view.receivers(index, is_lit=light.paths.direct), rays=(*gather_rays, *local))
 
 
 def evaluate_outgoing(outgoing, patch, direction, *, is_narrow=False):

@@ -117,7 +117,7 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
     bake, look = bake_with_btf(plane, record, size, folder / "table.zarr", 60 if tiny else 1000)
     view = bake.views["camera"]
     light = illumination_from_look(look, bake.material_names, has_bounces=False)
-    lights, receivers = bake.incident_light(view, 0, light, bake.cache)
+    lights, receivers = bake.incident_light(bake.samples(view, 0, bake.cache), light)
     uv = _to_middles(receivers.uv, values.size)
     texels = TERMS["measured_btf"].normalized(dict(look.materials["Cloth"].terms[0])).texels
     assert texels is not None

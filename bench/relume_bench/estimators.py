@@ -54,7 +54,7 @@ def measure(tiny: bool) -> list[Figure]:
             validate(transfer.default_look, transfer.default_look), transfer.material_names, has_bounces=True
         )
         assert isinstance(transfer, BakedIndirectViews)
-        radiance = transfer.indirect.exact(light).isotropic
+        radiance = transfer.indirect.outgoing_light(light).isotropic
         num_rays = store.shape("views/0/gather_hits")[1]
         sample_rows = np.linspace(0, store.shape("views/0/gather_hits")[0] - 1, num_samples).astype(np.int64)
         position, normal = (store.read(f"views/0/{name}")[sample_rows] for name in ("position", "normal"))

@@ -26,7 +26,7 @@ from relume.look import Look, validate
 from relume.math.daubechies import analysis
 from relume.methods.direct import DirectMethod
 from relume.methods.store_layout import read_lights
-from relume.operators.linear_operator import precompute
+from relume.operators.edit_basis import CurveBasis, precompute
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
@@ -122,9 +122,8 @@ def _full_term(transfer: FixedViewTransfer, receivers: Any, document: dict[str, 
     term = TERMS[document["model"]].normalized(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
     active = max(bands, key=lambda name: bands[name].shape[1])
-    operator = precompute(
-        term, bands, active, read_lights(transfer.store), receivers, lambda share: None, lambda: False
-    )
+    basis, lights = CurveBasis.from_curve(term.curve(active)), read_lights(transfer.store)
+    operator = precompute(basis, term, bands, lights, receivers, lambda share: None, lambda: False)
     sums = np.einsum("tcjs,cj->tsc", operator.transport.astype(np.float64), analysis(bands[active]), optimize=True)
     radiance = sums.reshape(-1, 3)[: len(cos_theta_o)] * np.asarray(document["color"])
     for curve in term.curves:

@@ -24,7 +24,7 @@ from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
-from relume.operators.linear_operator import operator_bytes, quantized_bytes
+from relume.operators.linear_operator import operator_bytes
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
@@ -76,7 +76,8 @@ def _measure_forms(transfer: FixedViewTransfer, forms: tuple[str, ...], num_edit
     """Drag with operators of several forms, each with memory for no better one."""
     rows = transfer.views["front"].rows(0)
     num = rows.stop - rows.start
-    budgets = {"float32": _ROOMY, "packed": operator_bytes(num, _BANDS) - 1, "thin": quantized_bytes(num, _BANDS) - 1}
+    one_less = (operator_bytes(num, _BANDS, bits) - 1 for bits in (32, 16))
+    budgets = dict(zip(("float32", "packed", "thin"), (_ROOMY, *one_less), strict=True))
     looks = _looks(transfer, num_edits)
     last = _open_exact(transfer, looks[-1], Cache(_ROOMY)).image()
     return {form: _measure_edits(transfer, looks, budgets[form], last) for form in forms}

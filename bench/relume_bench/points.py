@@ -14,7 +14,8 @@ from relume.brdf.registry import TERMS
 from relume.camera.view_samples import BACKGROUND, sample_view
 from relume.lights.spherical_triangles import TriangleLights, tessellate_environment
 from relume.math.daubechies import analysis
-from relume.operators.linear_operator import LinearOperator, precompute
+from relume.operators.edit_basis import CurveBasis, precompute
+from relume.operators.linear_operator import LinearOperator
 from relume.operators.update_kernel import changed_columns, stream
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
 from relume.raytrace.visibility import trace_visibility
@@ -76,11 +77,8 @@ def freeze_for_curve(lit_samples: LitSamples, document: Mapping[str, Any], activ
     """
     term = TERMS[document["model"]].normalized(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
-    operator = precompute(
-        term, bands, active, lit_samples.lights, lit_samples.receivers, lambda share: None, lambda: False
-    )
-    assert isinstance(operator, LinearOperator)
-    return operator
+    basis, lights, receivers = CurveBasis.from_curve(term.curve(active)), lit_samples.lights, lit_samples.receivers
+    return precompute(basis, term, bands, lights, receivers, lambda share: None, lambda: False)
 
 
 def frame_radiance(lit_samples: LitSamples, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:

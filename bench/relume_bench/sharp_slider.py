@@ -20,6 +20,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import F64
 from relume.brdf.term_validation import complete_term
 from relume.image_io.tone_mapping import tone_map
+from relume.operators.edit_basis import precompute
 from relume.operators.parameter_operator import ParameterOperator, linearize
 from relume.transport.projector import Projector
 from relume.transport.term_contraction import contract
@@ -59,7 +60,7 @@ def _errors(lit_samples: LitSamples, model: str, parameter: str, num: int) -> di
         raise ValueError(f"{parameter} of {model} has no nodes")
     term = TERMS[model]
     progress, is_canceled = (lambda share: None), (lambda: False)
-    operator = along.precompute(term, _bands(first), lit_samples.lights, lit_samples.receivers, progress, is_canceled)
+    operator = precompute(along, term, _bands(first), lit_samples.lights, lit_samples.receivers, progress, is_canceled)
     energy_fractions, noise_levels, negative = [], [], []
     for value in tenth:
         document = {**first, "params": {**first["params"], parameter: float(value)}}

@@ -32,6 +32,7 @@ from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
+from relume.operators.edit_basis import precompute
 from relume.operators.parameter_operator import linearize
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
@@ -161,7 +162,7 @@ def _freezes(tiny: bool, *drags: _Drag) -> tuple[float, dict[str, Any]]:
         bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
         freeze_arguments = (lit_samples.lights, lit_samples.receivers, lambda share: None, lambda: False)
         calls[f"{drag.model}.{drag.parameter}, {along.num_columns} nodes"] = partial(
-            along.precompute, term, bands, *freeze_arguments
+            precompute, along, term, bands, *freeze_arguments
         )
         calls[f"{drag.model}, θh"] = partial(freeze_for_curve, lit_samples, document, "theta_h")
     durations = [float(np.median(times)) for times in time_interleaved(list(calls.values()), 2 if tiny else 5)]

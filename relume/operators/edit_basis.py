@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Curve, Term
 from relume.lights.spherical_triangles import TriangleLights
-from relume.math.daubechies import analysis
-from relume.operators.linear_operator import LinearOperator, precompute
-from relume.operators.quantized import QuantizedOperator
+from relume.math.daubechies import analysis, forward
+from relume.operators.linear_operator import LinearOperator, level_bounds, pack_columns
+from relume.transport.roughness_ranges import contract_levels, project_levels, without_free_curves
 from relume.transport.shading_points import ShadingPoints
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
@@ -51,18 +52,16 @@ class EditBasis(Protocol):
         """Return the coefficients c of a term's curves, (3, J) each."""
         ...
 
-    def precompute(
-        self,
-        term: Term,
-        bands: Mapping[str, F64],
-        lights: TriangleLights,
-        receivers: ShadingPoints,
-        progress: Callable[[float], None],
-        is_canceled: Callable[[], bool],
-        *,
-        is_quantized: bool = False,
-    ) -> LinearOperator | QuantizedOperator:
-        """Precompute the operator. See `relume.operators.linear_operator.precompute`."""
+    def columns(
+        self, term: Term, bands: Mapping[str, F64], lights: TriangleLights, receivers: ShadingPoints
+    ) -> Callable[[int, int], Shaped[F32, "3 samples columns"]]:
+        """Return a function that computes the operator's columns at samples [start, stop), called in several threads.
+
+        Args:
+            bands: bands of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of
+                the affected ones do not matter.
+            lights, receivers: incident light, and its receivers.
+        """
         ...
 
 
@@ -94,16 +93,40 @@ class CurveBasis:
         """Return the wavelet coefficients."""
         return analysis(bands[self.name])
 
-    def precompute(
-        self,
-        term: Term,
-        bands: Mapping[str, F64],
-        lights: TriangleLights,
-        receivers: ShadingPoints,
-        progress: Callable[[float], None],
-        is_canceled: Callable[[], bool],
-        *,
-        is_quantized: bool = False,
-    ) -> LinearOperator | QuantizedOperator:
-        """See `relume.operators.linear_operator.precompute`."""
-        return precompute(term, bands, self.name, lights, receivers, progress, is_canceled, is_quantized=is_quantized)
+    def columns(
+        self, term: Term, bands: Mapping[str, F64], lights: TriangleLights, receivers: ShadingPoints
+    ) -> Callable[[int, int], Shaped[F32, "3 samples columns"]]:
+        """Return the columns T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Ben-Artzi
+        2006). See `EditBasis`."""
+        contractions = contract_levels(term, without_free_curves(bands, [self.name]), self.name)
+
+        def columns(start: int, stop: int) -> F32:
+            projected = project_levels(term, contractions, lights, receivers, start, stop)
+            coefficients = np.ascontiguousarray(projected.transpose(2, 0, 1))
+            forward(coefficients.reshape(-1, coefficients.shape[2]))
+            return coefficients
+
+        return columns
+
+
+def precompute(
+    basis: EditBasis,
+    term: Term,
+    bands: Mapping[str, F64],
+    lights: TriangleLights,
+    receivers: ShadingPoints,
+    progress: Callable[[float], None],
+    is_canceled: Callable[[], bool],
+    bits: int = 32,
+) -> LinearOperator:
+    """Precompute the operator of a term along a basis, at all receivers.
+
+    Args:
+        basis: the free coefficients. term, bands, lights, receivers: see `EditBasis.columns`.
+        progress: called with the completed fraction. is_canceled: polled. bits: see `Compression`.
+    Raises:
+        CancelledError: `is_canceled` returned True.
+    """
+    bounds = level_bounds(receivers, bands, basis.affected_curves)
+    columns = basis.columns(term, bands, lights, receivers)
+    return pack_columns(columns, basis.num_columns, receivers, bounds, progress, is_canceled, bits)

@@ -29,8 +29,6 @@ from relume.brdf.term import Curve, Term
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.curve_nodes import CurveNodes, choose_nodes
 from relume.math.pca import joint
-from relume.operators.linear_operator import LinearOperator, level_bounds, pack_columns
-from relume.operators.quantized import QuantizedOperator
 from relume.transport.roughness_ranges import at_roughness, num_levels, project_levels, without_free_curves
 from relume.transport.shading_points import ShadingPoints
 from relume.transport.term_contraction import contract
@@ -114,29 +112,13 @@ class ParameterOperator:
             for curve in self.curves
         }
 
-    def precompute(
-        self,
-        term: Term,
-        bands: Mapping[str, F64],
-        lights: TriangleLights,
-        receivers: ShadingPoints,
-        progress: Callable[[float], None],
-        is_canceled: Callable[[], bool],
-        *,
-        is_quantized: bool = False,
-    ) -> LinearOperator | QuantizedOperator:
-        """Contract all curves at all nodes in one pass: the columns are the images at the nodes.
+    def columns(
+        self, term: Term, bands: Mapping[str, F64], lights: TriangleLights, receivers: ShadingPoints
+    ) -> Callable[[int, int], Shaped[F32, "3 samples columns"]]:
+        """Return the images at all nodes, in one pass. See `EditBasis`.
 
         If the parameter affects a single curve, its nodes are combinations of that curve's bands, which are faster to
         project.
-
-        Args:
-            bands: bands of all the term's curves, (3, J) each; values of the affected ones do not matter.
-            lights, receivers: incident light, and its receivers.
-            progress: called with the completed fraction. is_canceled: polled.
-            is_quantized: whether the operator is quantized.
-        Raises:
-            CancelledError: `is_canceled` returned True.
         """
         node_bands = self.node_bands()
         single_curve = self.affected_curves[0] if len(self.affected_curves) == 1 else None
@@ -145,16 +127,15 @@ class ParameterOperator:
         contractions = [
             contract(term, b if single_curve else {**b, **node_bands}, single_curve) for b in fixed_by_level
         ]
-        bounds = level_bounds(receivers, bands, self.affected_curves)
         matrices = None if single_curve is None else node_bands[single_curve].astype(np.float32)
 
-        def rows(start: int, stop: int) -> F32:
+        def columns(start: int, stop: int) -> F32:
             projected = project_levels(term, contractions, lights, receivers, start, stop)
             if matrices is not None:
                 return np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)])
             return np.ascontiguousarray(projected.transpose(2, 0, 1))
 
-        return pack_columns(rows, self.num_columns, receivers, bounds, progress, is_canceled, is_quantized=is_quantized)
+        return columns
 
 
 def linearize(document: Mapping[str, Any], parameter: str) -> ParameterOperator | None:

@@ -13,7 +13,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.highlight_tables import HighlightTables
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
-from relume.transport.outgoing_patch_light import OutgoingLight, decay_of, radiance_from_patch
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, OutgoingLight, decay_of, radiance_from_patch
 
 F32 = NDArray[np.float32]
 OutgoingHighlights = tuple[HighlightTables, F32]
@@ -83,6 +83,12 @@ class OutgoingRadiance(NamedTuple):
         return OutgoingRadiance(
             self.isotropic - subtrahend.isotropic, rows, coefficients, roughening, self.bins.subtract(subtrahend.bins)
         )
+
+
+def isotropic_radiance(radiance: Shaped[F32, "patches 3"]) -> OutgoingRadiance:
+    """Return outgoing radiance that is the same in all directions."""
+    no_coefficients = np.empty((0, 3, NUM_OUTGOING), np.float32)
+    return OutgoingRadiance(radiance, np.empty(0, np.intp), no_coefficients, np.empty(0, np.float32))
 
 
 def first_bounce(

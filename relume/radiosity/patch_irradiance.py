@@ -13,9 +13,9 @@ from relume.brdf.albedo import Reflectances
 from relume.images.image_store import load_texture
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.zernike import OUTGOING_DEGREE, recurrence
+from relume.radiosity.binned_transport import incident_by_bins, mean_incoming
 from relume.radiosity.bounce import irradiance
 from relume.radiosity.highlight_tables import HighlightTables
-from relume.radiosity.mean_transfer import mean_incoming
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.surface_points import SurfacePoints
@@ -206,12 +206,17 @@ class PatchLight:
     def _gather_hits_by_point(self) -> NDArray[np.uint16]:
         return self.gather_hits.reshape(self.points.num_points, self.pattern.num_rays)
 
-    def incident_light(self, outgoing: OutgoingLight, rows: Shaped[NDArray[np.intp], " G"]) -> IncidentLight:
+    def incident_light(
+        self, outgoing: OutgoingLight, rows: Shaped[NDArray[np.intp], " G"], *, is_binned: bool = False
+    ) -> IncidentLight:
         """Return the incident light from other patches with directional light.
 
         Args:
             outgoing: outgoing light of all patches. rows: patches that need coefficients.
+            is_binned: approximates directions by bins, see `relume.radiosity.binned_transport`.
         """
+        if is_binned:
+            return incident_by_bins(self.gather_hits, self.outgoing_bins, self.incident_bins, outgoing, rows)
         gather_hits = self._gather_hits_by_point
         point_values = ray_incident_coefficients(self.points, [GatherRays(gather_hits, self.pattern, outgoing)], 0)[
             ..., 0

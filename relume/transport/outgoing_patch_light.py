@@ -63,6 +63,12 @@ def isotropic(radiance: Shaped[F32, "patches 3"]) -> OutgoingLight:
     )
 
 
+@lru_cache(maxsize=1)
+def no_light() -> OutgoingLight:
+    """Return the light of black patches, for rays whose light follows."""
+    return isotropic(np.zeros((NO_PATCH + 1, 3), np.float32))
+
+
 def radiance_from_patch(
     isotropic_radiance: Shaped[F32, "patches 3"],
     rows: Shaped[NDArray[np.intp], " G"],

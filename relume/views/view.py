@@ -23,8 +23,8 @@ from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Camera
 from relume.store.bake_protocol import StoreReader
-from relume.transport.outgoing_patch_light import OutgoingLight
-from relume.transport.shading_points import GatherRays, LocalRays, ShadingPoints
+from relume.transport.outgoing_patch_light import no_light
+from relume.transport.shading_points import GatherRays, ShadingPoints
 from relume.views.gather_filter import make_neighbor_filter
 from relume.views.mirror_samples import MirrorSamples, read_mirror_samples
 from relume.views.store_io import (
@@ -172,30 +172,19 @@ class View:
         seed = read_seeds(self.store, self.index, rows.start, rows.stop)
         return read_surface_points(self.store, self.index, rows.start, rows.stop, seed)
 
-    def receivers(
-        self,
-        material: int,
-        outgoing: OutgoingLight | None = None,
-        local: Sequence[LocalRays] = (),
-        *,
-        is_lit: bool = True,
-    ) -> ShadingPoints:
-        """Read a material's samples from the store as shading points.
+    def receivers(self, material: int, *, is_lit: bool = True) -> ShadingPoints:
+        """Read a material's samples from the store as shading points, without rays.
 
         Args:
-            material: its index.
-            outgoing: light of the patches for gather rays; from `FixedViewTransfer.outgoing_patch_light`.
-            local: visibility of local lights from the samples.
-            is_lit: the environment emits light; else no visibility is read.
+            material: its index. is_lit: the environment emits light; else no visibility is read.
         """
         rows = self.rows(material)
         visible = self._read_visibility(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
         surface_points = self.surface_points(material)
-        gather_rays = () if outgoing is None else (self.gather_rays(material, outgoing),)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
         level = self.level[rows] if self.ratios[material] else None
         wo = view_directions(self.ray_origins(rows), surface_points.position)
-        return ShadingPoints(surface_points, wo, visible, (*gather_rays, *local), uv, level)
+        return ShadingPoints(surface_points, wo, visible, (), uv, level)
 
     def _read_visibility(self, material: int) -> NDArray[np.uint8]:
         """Read the visibility of a material's samples, cached because decompression is slow."""
@@ -221,19 +210,26 @@ class View:
             return np.asarray(self._read_visibility(material)[sample_indices])
         return np.asarray(self.store.read(path, rows.start, rows.stop)[sample_indices])
 
-    def subset_rays(
-        self, material: int, sample_indices: Shaped[NDArray[np.integer], " k"], outgoing: OutgoingLight
-    ) -> GatherRays:
-        """Read gather rays of some of a material's samples, unfiltered. See `read_rows`, `gather_rays`."""
+    def subset_rays(self, material: int, sample_indices: Shaped[NDArray[np.integer], " k"]) -> GatherRays:
+        """Read gather rays of some of a material's samples, unfiltered and without light. See `read_rows`."""
         gather_hits = np.asarray(self.read_rows("gather_hits", material, sample_indices), np.uint16)
-        return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), outgoing)
+        return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), no_light())
 
-    def gather_rays(self, material: int, outgoing: OutgoingLight) -> GatherRays:
-        """Read the gather rays of a material's samples, with the filter between neighbors."""
+    def gather_rays(self, material: int) -> GatherRays:
+        """Read the gather rays of a material's samples without light, with the filter between neighbors."""
         rows = self.rows(material)
         gather_hits = self.store.read(f"views/{self.index}/gather_hits", rows.start, rows.stop)
         pattern = make_material_pattern(self.store, self.index, material)
-        return GatherRays(gather_hits, pattern, outgoing, sharing=self._neighbor_filter(material))
+        return GatherRays(gather_hits, pattern, no_light(), self._neighbor_filter(material))
+
+    def mirror_lights(self, material: int) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Read the virtual lights in planar mirrors that a material's samples see, as bits."""
+        rows = self.rows(material)
+
+        def read() -> NDArray[np.uint8]:
+            return np.asarray(self.store.read(f"views/{self.index}/mirror_lights", rows.start, rows.stop), np.uint8)
+
+        return self.cache.transient.get_value((self.key, "mirror lights", *self.sample_key(material)), read)
 
     def trace_gather_rays(self, material: int, is_canceled: Callable[[], bool]) -> None:
         """Trace gather rays that were not baked, because of an overridden normal map; reading them is then immediate.

@@ -31,7 +31,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.patches.patches import patch_sample_points
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight
-from relume.radiosity.solve_bounces import solve_indirect
+from relume.radiosity.solve_bounces import solve_bounces
 from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern, ray_weight
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference import ReferencePoints, environment_texels
@@ -79,7 +79,7 @@ def patches(lights):
 def outgoing_from_patches(patches, lights, first=1, last=24, reflectances=REFLECTANCES):
     reflecting = patches.reflectance_operator(reflectances)
     vectors = patches.incident_coefficients(reflecting.rows, lights, OUTGOING_DEGREE)
-    return solve_indirect(
+    return solve_bounces(
         patches, reflecting, IncidentLight(patches.irradiance(lights), vectors), first, last
     ).outgoing_light(patches)
 
@@ -260,8 +260,11 @@ def default_look(transfer):
 def against_paths(scene, transfer, index, every, spp):
     """Indirect light at samples of a material, and by path tracing with its variance. (n, 3)"""
     view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
-    reflected = transfer.outgoing_patch_light(illumination_from_look(look, transfer.material_names, has_bounces=True))
-    rows, lit = view.rows(index), view.receivers(index, reflected)
+    reflected = transfer.indirect.outgoing_light(
+        illumination_from_look(look, transfer.material_names, has_bounces=True)
+    )
+    rows = view.rows(index)
+    lit = replace(view.receivers(index), rays=(replace(view.gather_rays(index), outgoing=reflected),))
     rows_compared, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
     radiance = np.zeros((len(lit.normal), 3))
     for document in look.materials[name].terms:

@@ -16,7 +16,8 @@ from relume.core.cache import Cache
 from relume.core.errors import CancelledError, MemoryBudgetError
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.math.daubechies import analysis, matrix, synthesis
-from relume.operators.linear_operator import LinearOperator, operator_bytes, precompute
+from relume.operators.edit_basis import CurveBasis, precompute
+from relume.operators.linear_operator import LinearOperator, operator_bytes
 from relume.operators.update_kernel import changed_columns, stream
 from relume.transport.projector import Projector
 from relume.transport.term_contraction import contract
@@ -74,7 +75,8 @@ def frozen_of(model, active, lights, receivers, **options):
     bands = {curve.name: curve_bands(document, curve) for curve in TERMS[model].curves}
     progress = options.get("progress", lambda fraction: None)
     is_canceled = options.get("is_canceled", lambda: False)
-    return bands, precompute(TERMS[model], bands, active, lights, receivers, progress, is_canceled)
+    basis = CurveBasis.from_curve(TERMS[model].curve(active))
+    return bands, precompute(basis, TERMS[model], bands, lights, receivers, progress, is_canceled)
 
 
 def rows_of(frozen, count):

@@ -14,6 +14,7 @@ from relume.core.errors import CancelledError
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.math.curve_nodes import choose_nodes
 from relume.math.pca import joint
+from relume.operators.edit_basis import precompute
 from relume.operators.parameter_operator import MAX_ERROR, MAX_NODES, linearize
 from relume.operators.update_kernel import changed_columns, stream
 from relume.transport.projector import Projector
@@ -58,7 +59,7 @@ def frozen_along(document, parameter, lights, receivers):
     linearised = linearize(document, parameter)
     assert linearised is not None
     assert linearised.num_columns <= MAX_NODES
-    frozen = linearised.precompute(term, bands_of(document), lights, receivers, lambda fraction: None, lambda: False)
+    frozen = precompute(linearised, term, bands_of(document), lights, receivers, lambda fraction: None, lambda: False)
     return linearised, frozen
 
 
@@ -139,7 +140,7 @@ def test_cancelling_stops_the_freeze(lights, receivers):
     document = {"model": "ggx", "params": {}}
     linearised = linearize(document, "f0")
     with pytest.raises(CancelledError):
-        linearised.precompute(TERMS["ggx"], bands_of(document), lights, receivers, lambda fraction: None, lambda: True)
+        precompute(linearised, TERMS["ggx"], bands_of(document), lights, receivers, lambda fraction: None, lambda: True)
 
 
 def products(model, parameter, values):

@@ -6,10 +6,8 @@ import numpy as np
 import numpy_reference as ref
 import pytest
 
-from relume.operators.linear_operator import LinearOperator, quantized_bytes, tile_layout
-from relume.operators.quantized import BLOCK_SAMPLES, QuantizedOperator, quantize, stream_quantized
-from relume.operators.subsampled import SubsampledOperator, interpolate, subsampled_bytes
-from relume.operators.update_kernel import changed_columns, stream
+from relume.operators.linear_operator import Interpolation, LinearOperator, operator_bytes, quantize, tile_layout
+from relume.operators.update_kernel import BLOCK_SAMPLES, changed_columns, interpolate, stream, stream_quantized
 
 RNG = np.random.default_rng(4)
 
@@ -26,7 +24,7 @@ def packed_of(transport):
                 np.ascontiguousarray(transport[tile, :, :, here].transpose(0, 2, 1))
             )
             values[tile, :, :, here] = rows.transpose(0, 2, 1)
-    return QuantizedOperator(values, scale, np.ones((3, num)))
+    return LinearOperator(values, np.ones((3, num)), scale=scale)
 
 
 def whole_numbers(packed):
@@ -74,7 +72,7 @@ def test_16_bits_round_to_half_a_step_of_the_block_maximum():
 def test_quantized_columns_take_half_the_memory():
     transport = lively(2, 3, 64, 1040)
     packed = packed_of(transport)
-    assert packed.num_bytes == quantized_bytes(2080, 64) if tile_layout(2080) == (2, 1040) else True
+    assert packed.num_bytes == operator_bytes(2080, 64, bits=16) if tile_layout(2080) == (2, 1040) else True
     assert packed.num_bytes < 0.51 * transport.nbytes
     np.testing.assert_allclose(packed.columns_at(1040 + 700), whole_numbers(packed)[1, :, :, 700])
 
@@ -97,11 +95,12 @@ def test_a_subsampled_operator_adds_the_change_of_its_samples():
     few = LinearOperator(lively(1, 3, 4, 16), RNG.random((3, 4)))
     near = RNG.integers(0, 10, size=(40, 3)).astype(np.int32)
     weight = RNG.dirichlet(np.ones(3), 40).astype(np.float32)
-    subsampled = SubsampledOperator(few, 10, near, weight)
+    subsampled = few.interpolated(Interpolation(10, near, weight))
     change, image = RNG.normal(size=(3, 4)), np.zeros((1, 3, 48), np.float32)
     subsampled.add(change, image)
     for sample in (0, 17, 39):
         expected = (subsampled.columns_at(sample) * change).sum(axis=1)
         np.testing.assert_allclose(image[0, :, sample], expected, rtol=1e-4, atol=1e-5 * np.abs(image).max())
     np.testing.assert_allclose(subsampled.importance, 2 * few.importance)  # each represents four
-    assert subsampled_bytes(40, 10, 4) == quantized_bytes(10, 4) + near.nbytes + weight.nbytes
+    assert operator_bytes(40, 4, 16, 10) == operator_bytes(10, 4, bits=16) + near.nbytes + weight.nbytes
+    assert subsampled.num_bytes == few.num_bytes + near.nbytes + weight.nbytes

@@ -10,10 +10,9 @@ from relume.lights.spherical_triangles import tessellate_environment
 from relume.math.zernike import OUTGOING_DEGREE
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.patches.patches import patch_sample_points
-from relume.radiosity.coarse_irradiance import incident_fast
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight
-from relume.radiosity.solve_bounces import OutgoingRadiance, solve_indirect, solve_indirect_fast
+from relume.radiosity.solve_bounces import Directions, OutgoingRadiance, solve_bounces
 from relume.raytrace.gather_rays import cosine_ray, lattice_offsets, make_pattern
 from relume.transport.direction_bins import incoming_bins, outgoing_bins
 from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, bin_of
@@ -69,7 +68,10 @@ def test_fast_incident_light_equals_that_of_direction_bins(patches, incident_lig
     reflecting = patches.reflectance_operator((DIFFUSE, SHINY))
     even, vectors = reflecting.apply(incident_light)
     now = OutgoingRadiance(even, reflecting.rows, vectors, reflecting.roughening).outgoing_light(patches)
-    exact, quick = patches.incident_light(now, reflecting.rows), incident_fast(patches, now, reflecting.rows)
+    exact, quick = (
+        patches.incident_light(now, reflecting.rows),
+        patches.incident_light(now, reflecting.rows, is_binned=True),
+    )
     np.testing.assert_allclose(quick.irradiance, exact.irradiance, rtol=1e-4)
     assert relative_rmse(quick.coefficients[..., :6], exact.coefficients[..., :6]) < 0.05
     in_squares, lobe = np.zeros((30, 3, NUM_OUTGOING)), now.lobe[patches.gather_hits]
@@ -86,7 +88,8 @@ def test_fast_bounces_are_near_exact_bounces(patches, incident_light, wall, firs
     reflecting = patches.reflectance_operator((DIFFUSE, wall))
     incident = IncidentLight(incident_light.irradiance, incident_light.coefficients[: len(reflecting.rows)])
     exact, quick = (
-        solve(patches, reflecting, incident, first, last) for solve in (solve_indirect, solve_indirect_fast)
+        solve_bounces(patches, reflecting, incident, first, last, directions=directions)
+        for directions in (Directions.EXACT, Directions.BINNED)
     )
     assert relative_rmse(quick.isotropic, exact.isotropic) < 0.03
     assert np.linalg.norm(quick.coefficients - exact.coefficients) <= 0.05 * np.linalg.norm(exact.coefficients)

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from relume.core.color import luminance, srgb_encode
 from relume.live.fixed_camera.coverage import Coverage
-from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.mirror_samples import lit_rectangles
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, Look
 from relume.look.model import BackgroundLook, Rgb
@@ -211,7 +212,9 @@ class UnoccludedLight:
     def _from_triangles(self, light: Illumination, *, is_preview: bool) -> F32:
         """Light from the environment for each distinct normal. (normals, 3) float32"""
         term = self._material.terms[0]
-        incident = self._transfer.unoccluded_environment(light, self._distinct_normals, is_preview=is_preview)
+        quality = LightQuality.PREVIEW if is_preview else LightQuality.EXACT
+        samples = self._transfer.unoccluded_samples(self._distinct_normals)
+        incident = self._transfer.incident_light(samples, direct_environment(light), quality)
         return shade(term.term, term.target_bands, *incident, lambda share: None, lambda: False).rows(
             self._distinct_normals.num_points
         )

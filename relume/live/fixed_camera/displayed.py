@@ -14,7 +14,7 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
 from relume.look.model import Rgb
 from relume.operators.edit_basis import EditBasis
-from relume.operators.operator import Operator
+from relume.operators.linear_operator import LinearOperator
 from relume.operators.shade import ShadedTerm
 from relume.views.view import Tile
 
@@ -84,7 +84,7 @@ class DisplayedImage:
         return DisplayedImage(np.zeros_like(self.image), reference=reference)
 
     def evaluate_operator(
-        self, operator: Operator, basis: EditBasis, target_bands: Mapping[str, F64], light: Illumination
+        self, operator: LinearOperator, basis: EditBasis, target_bands: Mapping[str, F64], light: Illumination
     ) -> DisplayedImage:
         """Return the image of a target from all coefficients of an operator, written into this image's array.
 
@@ -129,7 +129,7 @@ def norm_of(image: Shaped[F32, " ..."]) -> float:
     return float(np.sqrt(np.dot(flat, flat)))
 
 
-def accumulated_error(norm: float, change: Shaped[F64, "*levels 3 J"], operator: Operator) -> float:
+def accumulated_error(norm: float, change: Shaped[F64, "*levels 3 J"], operator: LinearOperator) -> float:
     """Expected norm of the rounding errors of R + Σ_j Δc_j T_j in float32, with unit roundoff u.
 
     u √(Σ_k (‖R‖ + Σ_{j≤k} |Δc_j| ‖T_j‖)² / 3), k over the additions to the image: each addition rounds a sum of at most

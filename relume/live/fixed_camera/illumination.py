@@ -75,6 +75,12 @@ def direct_from(light: Illumination, local: tuple[LightSource, ...]) -> Illumina
     return dark._replace(paths=light.paths.without_reflections())
 
 
+def direct_environment(light: Illumination) -> Illumination:
+    """Return the direct light of the environment alone, shown or not."""
+    paths = light.paths._replace(direct=True).without_reflections()
+    return light._replace(paths=paths, reflectances=(), local=())
+
+
 def split_for_shading(light: Illumination) -> dict[Illumination, Rgb]:
     """Split a light into components that are shaded separately: direct environment, direct local lights, indirect
     light.

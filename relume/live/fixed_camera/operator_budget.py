@@ -11,16 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import num_threads
 from relume.live.fixed_camera.material_image import MaterialImage
-from relume.operators.linear_operator import LinearOperator, operator_bytes, quantized_bytes
-from relume.operators.quantized import QuantizedOperator
-from relume.operators.subsampled import NUM_NEIGHBORS, SubsampledOperator, subsampled_bytes
+from relume.operators.linear_operator import NUM_NEIGHBORS, Compression, Interpolation, LinearOperator, operator_bytes
 from relume.transport.shading_points import GatherRays, RayList, ShadingPoints
 from relume.views.gather_filter import make_neighbor_filter
 from relume.views.pixel_blocks import nearest_chosen, one_per_block
@@ -39,44 +36,35 @@ _MIN_LIGHTS_TO_MERGE = 800  # with fewer lights, merging leaves more than half o
 _SOFTENING = 0.05  # pixels²; smooths the interpolation weights near a shaded sample
 
 
-class OperatorForm(NamedTuple):
-    """Precision and sampling of an operator.
+EXACT, QUANTIZED = Compression(), Compression(bits=16)
+MERGED_LIGHT = Compression(has_merged_lights=True)
 
-    Attributes:
-        step: one sample per block of step × step pixels; 1: all. is_quantized: stored in 16 bits.
-        is_merged_light: computed from merged lights.
+
+def compressed_bytes(material: MaterialImage, num_columns: int, form: Compression) -> int:
+    """Return the memory of an operator for a term of a material.
+
+    Args:
+        material: the image of a material. num_columns: number of columns of the operator, in each channel.
+        form: compression of the operator.
     """
-
-    step: int
-    is_quantized: bool
-    is_merged_light: bool = False
-
-    def num_bytes(self, material: MaterialImage, num_columns: int) -> int:
-        """Return its memory for a term of a material. num_columns: in each channel."""
-        if self.step > 1:
-            return subsampled_bytes(material.num_samples, material.num_pixel_blocks(self.step), num_columns)
-        return (quantized_bytes if self.is_quantized else operator_bytes)(material.num_samples, num_columns)
+    num_selected = None if form.step == 1 else material.num_pixel_blocks(form.step)
+    return operator_bytes(material.num_samples, num_columns, form.bits, num_selected)
 
 
-EXACT = OperatorForm(1, is_quantized=False)
-QUANTIZED = OperatorForm(1, is_quantized=True)
-MERGED_LIGHT = OperatorForm(1, is_quantized=False, is_merged_light=True)
-
-
-def operator_form(material: MaterialImage, num_columns: int, budget_bytes: int) -> OperatorForm | None:
+def operator_form(material: MaterialImage, num_columns: int, budget_bytes: int) -> Compression | None:
     """Return the best form of an operator that fits the budget; None if none does.
 
     Args:
         material: the image of a material. num_columns: number of columns of the operator, in each channel.
         budget_bytes: budget in bytes of the cache.
     """
-    if EXACT.num_bytes(material, num_columns) <= budget_bytes:
+    if compressed_bytes(material, num_columns, EXACT) <= budget_bytes:
         return EXACT
-    if QUANTIZED.num_bytes(material, num_columns) <= budget_bytes - budget_bytes // _SPARE_BUDGET_DIVISOR:
+    if compressed_bytes(material, num_columns, QUANTIZED) <= budget_bytes - budget_bytes // _SPARE_BUDGET_DIVISOR:
         return QUANTIZED
     for step in range(2, _MAX_STEP + 1):
-        form = OperatorForm(step, is_quantized=True)
-        if form.num_bytes(material, num_columns) <= budget_bytes // _SUBSAMPLED_BUDGET_DIVISOR:
+        form = Compression(step, bits=16)
+        if compressed_bytes(material, num_columns, form) <= budget_bytes // _SUBSAMPLED_BUDGET_DIVISOR:
             return form if material.num_pixel_blocks(step) >= _MIN_SAMPLES else None
     return None
 
@@ -91,7 +79,7 @@ def use_coarse(material: MaterialImage, num_columns: int, num_lights: int, budge
         num_lights >= _MIN_LIGHTS_TO_MERGE
         and material.num_samples * num_lights > _SLOW_PAIRS_PER_THREAD * num_threads()
     )
-    return is_slow and 2 * EXACT.num_bytes(material, num_columns) <= budget_bytes
+    return is_slow and 2 * compressed_bytes(material, num_columns, EXACT) <= budget_bytes
 
 
 def precompute_subsampled(
@@ -99,8 +87,8 @@ def precompute_subsampled(
     material: int,
     step: int,
     receivers: ShadingPoints,
-    precompute: Callable[[ShadingPoints], LinearOperator | QuantizedOperator],
-) -> SubsampledOperator:
+    precompute: Callable[[ShadingPoints], LinearOperator],
+) -> LinearOperator:
     """Precompute an operator from one sample per pixel block.
 
     Args:
@@ -110,9 +98,8 @@ def precompute_subsampled(
     """
     sample_indices = one_per_block(view, material, step)
     neighbors, weight = nearest_chosen(view, material, sample_indices, step, NUM_NEIGHBORS, _SOFTENING)
-    return SubsampledOperator(
-        precompute(_subsample(view, material, step, receivers, sample_indices)), len(sample_indices), neighbors, weight
-    )
+    operator = precompute(_subsample(view, material, step, receivers, sample_indices))
+    return operator.interpolated(Interpolation(len(sample_indices), neighbors, weight))
 
 
 def _subsample(

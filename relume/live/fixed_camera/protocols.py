@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeAlias
 
 import numpy as np
 from jaxtyping import Shaped
@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.raytrace.surface_points import SurfacePoints
     from relume.scene.model import Camera
     from relume.store.bake_protocol import StoreReader
-    from relume.transport.shading_points import LocalRays, MirrorRays, ShadingPoints
+    from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
     from relume.views.map_override_store import RayTracer
     from relume.views.view import View
 
@@ -45,37 +45,84 @@ class CameraMode(Enum):
     FREE = "free"
 
 
+class LightQuality(Enum):
+    """Accuracy of incident light.
+
+    A preview uses a small map of the environment and baked normals of patches; merged light, a few triangles that refer
+    to the exact ones.
+    """
+
+    PREVIEW = "preview"
+    MERGED = "merged"
+    EXACT = "exact"
+
+
 LightsAndPoints: TypeAlias = "tuple[TriangleLights, ShadingPoints]"
 """The environment's triangles, and the shading points that they and rays illuminate."""
 
 
-class SampledShading(Protocol):
-    """A subset of a material's samples, cached so that it can be shaded quickly in any light."""
+class Samples(Protocol):
+    """Points that receive light: samples of a material, as far as they are read.
+
+    Attributes:
+        mirror_visibility: virtual lights that they see in planar mirrors, as bits; None for none.
+    """
 
     @property
+    def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"] | None: ...
+    @property
     def num_bytes(self) -> int:
-        """Memory that it takes."""
+        """Memory that they take."""
         ...
 
-    def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """Return an approximation of their incident light."""
+    def receivers(self, *, is_lit: bool) -> ShadingPoints:
+        """Return the points without rays. is_lit: with the visibility of the environment."""
+        ...
+
+    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
+        """Return their gather rays, without light; missing ones are traced. None if they have none."""
+        ...
+
+    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights. points: the receivers"""
+        ...
+
+
+class RaysToSamples(NamedTuple):
+    """Light along rays to some samples of a material.
+
+    Attributes:
+        sample_indices: counted from the material's first. rays: to these.
+    """
+
+    sample_indices: Shaped[NDArray[np.integer], " k"]
+    rays: RayList
+
+
+class PatchRadiance(Protocol):
+    """Outgoing radiance of patches, or its change."""
+
+    def mean_to_others(self) -> Shaped[F32, "patches 3"]:
+        """Return the mean radiance of each patch toward other patches."""
+        ...
+
+    def rays_to(self, view: View, material: int) -> RaysToSamples | None:
+        """Return the light that samples of a material receive along other rays than gather rays; None for none."""
         ...
 
 
 class IndirectLight(Protocol):
-    """Indirect illumination between patches, as far as interactive updates need it."""
+    """Indirect illumination between patches."""
 
-    @property
-    def num_patches(self) -> int:
-        """Number of patches."""
-        ...
+    def solve_indirect(
+        self, light: Illumination, quality: LightQuality, start_from: Illumination | None = None
+    ) -> PatchRadiance:
+        """Return the outgoing radiance of patches; see `relume.live.opened.indirect_solver`.
 
-    def preview(self, light: Illumination) -> Shaped[F32, "rows 3"]:
-        """Return the approximate outgoing radiance of at least `num_patches` patches."""
-        ...
-
-    def preview_delta(self, before: Illumination, after: Illumination) -> Shaped[F32, "patches 3"]:
-        """Return the approximate change of outgoing radiance per patch."""
+        Args:
+            light: the illumination. quality: exact, or fast for active edits.
+            start_from: light of an earlier solution; the result is then the change from that.
+        """
         ...
 
 
@@ -94,20 +141,6 @@ class LocalLightTransport(Protocol):
 
     def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
         """Return the unoccluded irradiance at points from a light of unit emission."""
-        ...
-
-
-class MirrorLightsDelta(Protocol):
-    """Change of the light that planar mirrors reflect.
-
-    Attributes:
-        patch_radiance: its part that patches on those mirrors send by their lobes. (patches, 3)
-    """
-
-    @property
-    def patch_radiance(self) -> F32: ...
-    def rays(self, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
-        """Return the rays to samples. visible: from `FixedViewTransfer.mirror_lights_of`"""
         ...
 
 
@@ -189,40 +222,18 @@ class FixedViewTransfer(OpenBake, Protocol):
         """Return whether the image of a term is cached on disk, by a job's key without the store's own."""
         ...
 
-    def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
-        """Return the incident light at a material's samples.
+    def samples(self, view: View, material: int, cache: Cache) -> Samples:
+        """Return all samples of a material, read when they are lit.
 
         Args:
             view: the view. material: index of the material. cache: holds shadows that must be traced.
         """
         ...
 
-    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Trace the rays that patches lack for indirect light if normal-map overrides change their normals.
-
-        Args:
-            light: the illumination with its reflectances. is_canceled: polled regularly.
-        Raises:
-            CancelledError: `is_canceled` returned true.
-        """
-        ...
-
-    def clustered_lights(self, light: Illumination) -> TriangleLights:
-        """Return the triangles of direct environment light, merged into a few that refer to their members."""
-        ...
-
-    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
-        """Return the mirror lights that are visible from a material's samples, as bits; None if they were not baked."""
-        ...
-
-    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> MirrorLightsDelta | None:
-        """Return the change of the light that planar mirrors reflect, in the same environment; None for none."""
-        ...
-
-    def subset(
+    def selected_samples(
         self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " k"], *, has_indirect: bool
-    ) -> SampledShading:
-        """Return some of a material's samples.
+    ) -> Samples:
+        """Return some of a material's samples, read now to be lit quickly.
 
         Args:
             view: the view. material: index of the material. sample_indices: counted from the material's first.
@@ -230,13 +241,25 @@ class FixedViewTransfer(OpenBake, Protocol):
         """
         ...
 
-    def unoccluded_environment(
-        self, light: Illumination, points: SurfacePoints, *, is_preview: bool
+    def unoccluded_samples(self, points: SurfacePoints) -> Samples:
+        """Return points to which nothing occludes the environment, viewed along their normals."""
+        ...
+
+    def incident_light(
+        self,
+        samples: Samples,
+        light: Illumination,
+        quality: LightQuality = LightQuality.EXACT,
+        is_canceled: Callable[[], bool] = lambda: False,
     ) -> LightsAndPoints:
-        """Return the unoccluded light of the environment at points that are viewed along their normals.
+        """Return the incident light at samples; missing rays are traced.
 
         Args:
-            is_preview: approximate it with a small map.
+            samples: samples of this bake. light: the illumination with its reflectances.
+            quality: accuracy of the light.
+            is_canceled: polled regularly.
+        Raises:
+            CancelledError: `is_canceled` returned true.
         """
         ...
 

@@ -15,7 +15,6 @@ from relume.brdf.term_validation import complete_term
 from relume.brdf.texture_slots import roughness_image
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
-from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import (
@@ -29,10 +28,16 @@ from relume.live.fixed_camera.illumination import (
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.mirror_samples import MirrorFactors
-from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer, MirrorLightsDelta
+from relume.live.fixed_camera.protocols import (
+    EditAxis,
+    FixedViewTransfer,
+    LightQuality,
+    LightsAndPoints,
+    PatchRadiance,
+)
 from relume.look import Look, TermLook, validate
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.operator import Operator
+from relume.operators.linear_operator import LinearOperator
 from relume.operators.parameter_operator import linearize
 from relume.operators.shade import ShadedTerm, shaded_bytes
 from relume.transport.shading_points import ShadingPoints
@@ -58,14 +63,13 @@ class OutgoingChange(NamedTuple):
     """Change of outgoing radiance between two lights, equal for all terms.
 
     Attributes:
-        before, after: the lights. coefficients: of the change per patch, in the Haar basis.
-        mirrors: change of the light that planar mirrors reflect.
+        before, after: the lights. radiance: change of the patches. coefficients: Haar coefficients of this change.
     """
 
     before: Illumination
     after: Illumination
-    coefficients: Shaped[F32, "patches 3"]
-    mirrors: MirrorLightsDelta | None
+    radiance: PatchRadiance
+    coefficients: Shaped[F32, "padded 3"]
 
 
 class ViewImages:
@@ -176,19 +180,15 @@ class ViewImages:
         return self.mirrors.update_emission(documents)
 
     def incident_light(
-        self, material: MaterialImage, light: Illumination, is_canceled: Callable[[], bool]
-    ) -> tuple[TriangleLights, ShadingPoints]:
-        """Return the incident light at the samples of a material; missing rays are traced.
-
-        Args:
-            material: its image. light: the illumination. is_canceled: polled regularly.
-        Raises:
-            CancelledError: `is_canceled` returned true.
-        """
-        if light.paths.has_indirect and material.num_samples:
-            self.view.trace_gather_rays(material.index, is_canceled)
-            self.transfer.solve_indirect_cache(light, is_canceled)
-        return self.transfer.incident_light(self.view, material.index, light, self.cache)
+        self,
+        material: MaterialImage,
+        light: Illumination,
+        is_canceled: Callable[[], bool],
+        quality: LightQuality = LightQuality.EXACT,
+    ) -> LightsAndPoints:
+        """Return the incident light at the samples of a material. See `FixedViewTransfer.incident_light`."""
+        samples = self.transfer.samples(self.view, material.index, self.cache)
+        return self.transfer.incident_light(samples, light, quality, is_canceled)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""
@@ -284,13 +284,13 @@ class ViewImages:
         key = self.image_key(material, live, self.light)
         return self.cache.get_cached(key, ShadedTerm) is not None or self.transfer.has_image(key[1:])
 
-    def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
+    def operator(self, material: MaterialImage, live: LiveTerm) -> LinearOperator | None:
         """Return the active operator of a term, a coarse one until the exact one is ready; None if it was evicted."""
         ready = live.ready
         if ready.basis is None or not live.is_converged:
             return None
         key = self.operator_key(material, live, ready.basis, ready.bands)
-        candidates = (self.cache.get_cached(name, Operator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))  # type: ignore[type-abstract]
+        candidates = (self.cache.get_cached(name, LinearOperator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))
         return next((operator for operator in candidates if operator is not None), None)
 
 

@@ -22,19 +22,17 @@ from relume.lights.local_lights import num_samples
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
-from relume.live.fixed_camera.illumination import Illumination, with_baked_normals
-from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightsAndPoints
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.local_lights import LocalLights, ShadowCache
-from relume.live.opened.planar_mirror_light import AddedMirrorLights
 from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
-from relume.transport.outgoing_patch_light import OutgoingLight
-from relume.transport.shading_points import GatherRays, RayList, ShadingPoints
+from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
 from relume.views.view import View, open_view
 
@@ -42,7 +40,7 @@ PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
-IntegrateEnvironment = Callable[[EnvironmentKey], TriangleLights]
+FindLights = Callable[[EnvironmentKey, LightQuality], TriangleLights]
 """Returns the triangles of an environment."""
 
 
@@ -123,27 +121,24 @@ class BakedFixedViews:
 
         return self.cache.get_value((self.key, "environment"), read)
 
-    def light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
+    def environment_lights(self, environment: EnvironmentKey, quality: LightQuality) -> TriangleLights:
         """Return the triangles of an environment: the tiles of the bake with new weights."""
+        if quality is LightQuality.PREVIEW:  # a large map takes seconds
+            return self.coarse_weights("lights", environment, self.environment_radiance)
+        if quality is LightQuality.MERGED:
+            return self._merged_lights(environment)
         return self.lights if environment == BAKED_ENVIRONMENT else self._integrate_environment(environment)
 
-    def lights_for(self, light: Illumination) -> TriangleLights:
+    def direct_lights(self, light: Illumination, quality: LightQuality) -> TriangleLights:
         """Return the environment triangles for direct illumination of the image."""
-        return displayed_of(self.light_of_environment(light.environment), light)
+        return displayed_of(self.environment_lights(light.environment, quality), light)
 
-    def clustered_lights(self, light: Illumination) -> TriangleLights:
-        """Return the triangles of `lights_for`, merged into a few. See `FixedViewTransfer`."""
+    def _merged_lights(self, environment: EnvironmentKey) -> TriangleLights:
+        def merge() -> TriangleLights:
+            lights = self.environment_lights(environment, LightQuality.EXACT)
+            return cluster_lights(lights, self.tiles, num_clusters(self.num_lights))
 
-        def merge_lights() -> TriangleLights:
-            return cluster_lights(
-                self.light_of_environment(light.environment), self.tiles, num_clusters(self.num_lights)
-            )
-
-        return displayed_of(self.cache.get_value((self.key, "merged lights", light.environment), merge_lights), light)
-
-    def preview_lights_for(self, light: Illumination) -> TriangleLights:
-        """Approximate the triangles of `lights_for`."""
-        return displayed_of(self.preview_light_of_environment(light.environment), light)
+        return self.cache.get_value((self.key, "merged lights", environment), merge)
 
     def _integrate_environment(self, environment: EnvironmentKey) -> TriangleLights:
         def integrate() -> TriangleLights:
@@ -155,14 +150,12 @@ class BakedFixedViews:
 
         return self.cache.get_value((self.key, "lights", environment), integrate)
 
-    def preview_light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
-        """Return an environment's triangles from a map of at most 256 texels' width: a large one takes seconds."""
-        return self.coarse_weights("lights", environment, self.environment_radiance)
-
     def coarse_weights(
         self, label: str, environment: EnvironmentKey, find_radiance: Callable[[str | None], F32]
     ) -> TriangleLights:
-        """Approximate the triangles of a part of an environment; caches everything that rotation does not change.
+        """Approximate the triangles of a part of an environment by a small map.
+
+        Caches everything that rotation does not change.
 
         Args:
             label: name of the part. environment: with that part. find_radiance: returns the part by environment name.
@@ -197,71 +190,41 @@ class BakedFixedViews:
         """Indirect illumination: none was baked."""
         return None
 
-    def outgoing_patch_light(self, light: Illumination) -> OutgoingLight | None:
-        """Return the outgoing light of patches; None if no indirect light reaches the image."""
-        return self.indirect.exact(light) if self.indirect is not None and light.paths.has_indirect else None
+    def samples(self, view: View, material: int, cache: Cache) -> Samples:
+        """Return all samples of a material. See `FixedViewTransfer`."""
+        return MaterialSamples(view, material, self.local, cache, (self.key, *view.sample_key(material)))
 
-    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Trace missing rays of patches: there are none. See `FixedViewTransfer`."""
-
-    def indirect_rays(
-        self,
-        light: Illumination,
-        gather_rays: GatherRays,
-        mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None,
-    ) -> tuple[RayList, ...]:
-        """Return the rays that carry indirect illumination to samples.
-
-        Args:
-            light: all light of the scene. gather_rays: gather rays of the samples; their `outgoing` is replaced.
-            mirror_visibility: lights that the samples see in planar mirrors.
-        """
-        outgoing = self.outgoing_patch_light(light)
-        return () if outgoing is None else (replace(gather_rays, outgoing=outgoing),)
-
-    def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
-        """Return incident light of a material's samples; traces shadows not in the cache. See `FixedViewTransfer`."""
-        lights = self.lights_for(light)
-        receivers = view.receivers(material, is_lit=lights.num_lights > 0)
-        return lights, replace(receivers, rays=self._rays(view, material, light, cache))
-
-    def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
-        """Return the rays of incident light: those of local lights."""
-        if not light.local:
-            return ()
-
-        def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
-            key = (self.key, *view.sample_key(material), "shadows", geometry)
-            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
-            return cache.get(key, ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points))
-
-        return self.local.rays_to(light, view.surface_points(material), cached_shadows)
-
-    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
-        """Return lights visible in planar mirrors: none without gather rays. See `FixedViewTransfer`."""
-        return None
-
-    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
-        """Return the change of light from planar mirrors: none. See `FixedViewTransfer`."""
-        return None
-
-    def subset(
+    def selected_samples(
         self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
-    ) -> SampledTransfer:
+    ) -> SelectedSamples:
         """Select samples of a material. See `FixedViewTransfer`."""
         shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
         visible = np.asarray(view.read_rows("visibility", material, sample_indices), np.uint8)
-        return SampledTransfer(self, replace(shading_points, visible=visible))
+        return SelectedSamples(replace(shading_points, visible=visible), self.local)
 
-    def unoccluded_environment(
-        self, light: Illumination, points: SurfacePoints, *, is_preview: bool
+    def unoccluded_samples(self, points: SurfacePoints) -> Samples:
+        """Return points to which nothing occludes the environment. See `FixedViewTransfer`."""
+        visible = np.packbits(points.normal @ self.shadow_ray_directions.T > 0, axis=1, bitorder="little")
+        return SelectedSamples(ShadingPoints(points, points.normal, visible), self.local)
+
+    def incident_light(
+        self,
+        samples: Samples,
+        light: Illumination,
+        quality: LightQuality = LightQuality.EXACT,
+        is_canceled: Callable[[], bool] = lambda: False,
     ) -> LightsAndPoints:
-        """Return unoccluded light of the environment at points, viewed along the normals. See `FixedViewTransfer`."""
-        direct_light = light._replace(paths=light.paths._replace(direct=True).without_reflections())
-        above = points.normal @ self.shadow_ray_directions.T > 0
-        visible = np.packbits(above, axis=1, bitorder="little")
-        lights = self.preview_lights_for(direct_light) if is_preview else self.lights_for(direct_light)
-        return lights, ShadingPoints(points, points.normal, visible)
+        """Return the incident light at samples. See `FixedViewTransfer`."""
+        lights = self.direct_lights(light, quality)
+        receivers = samples.receivers(is_lit=lights.num_lights > 0)
+        indirect = self._indirect_rays(samples, light, quality, is_canceled) if light.paths.has_indirect else ()
+        return lights, replace(receivers, rays=(*indirect, *samples.local_rays(light, receivers.points)))
+
+    def _indirect_rays(
+        self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
+    ) -> tuple[RayList, ...]:
+        """Return the rays that carry indirect illumination to samples: none was baked."""
+        return ()
 
     def downsampled(self, view_name: str, step: int) -> Self:
         """Return one view with 1 / step² of its pixels. Its images are not saved: its key is no folder."""
@@ -305,38 +268,84 @@ class BakedFixedViews:
 
 
 @dataclass(frozen=True)
-class SampledTransfer:
-    """Selected samples of a material, shaded in any light; a `relume.live.fixed_camera.protocols.SampledShading`.
+class MaterialSamples:
+    """All samples of a material, read when they are lit.
 
     Attributes:
-        receivers: without rays.
-        gather_rays: their gather rays, if baked; without outgoing light.
-        mirror_visibility: the lights that they see in planar mirrors, if baked.
+        view: the view. material: index of the material. local: casts the shadows of local lights.
+        cache: cache of these shadows. key: key of the samples in it.
     """
 
-    transfer: BakedFixedViews
-    receivers: ShadingPoints
-    gather_rays: GatherRays | None = None
+    view: View
+    material: int
+    local: LocalLights
+    cache: Cache
+    key: tuple[Hashable, ...]
+
+    num_bytes = 0
+
+    def receivers(self, *, is_lit: bool) -> ShadingPoints:
+        """Read the samples without rays. is_lit: with the visibility of the environment."""
+        return self.view.receivers(self.material, is_lit=is_lit)
+
+    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays:
+        """Read the gather rays, without light; missing ones are traced."""
+        rows = self.view.rows(self.material)
+        if rows.start < rows.stop:
+            self.view.trace_gather_rays(self.material, is_canceled)
+        return self.view.gather_rays(self.material)
+
+    @property
+    def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """The virtual lights that the samples see in planar mirrors."""
+        return self.view.mirror_lights(self.material)
+
+    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights, with cached shadows. points: the samples"""
+
+        def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
+            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
+            return self.cache.get(
+                (*self.key, "shadows", geometry), ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points)
+            )
+
+        return self.local.rays_to(light, points, cached_shadows)
+
+
+@dataclass(frozen=True)
+class SelectedSamples:
+    """Some points, read once to be lit quickly.
+
+    Attributes:
+        points: without rays. local: casts the shadows of local lights.
+        stored_rays: their gather rays without light; None for none.
+        mirror_visibility: the virtual lights that they see in planar mirrors; None for none.
+    """
+
+    points: ShadingPoints
+    local: LocalLights
+    stored_rays: GatherRays | None = None
     mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
 
     @property
     def num_bytes(self) -> int:
         """Memory in use."""
-        points, hit_bytes = self.receivers, 0 if self.gather_rays is None else self.gather_rays.gather_hits.nbytes
+        points, hit_bytes = self.points, 0 if self.stored_rays is None else self.stored_rays.gather_hits.nbytes
         return int(
             2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
         )
 
-    def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """Return incident light for a preview: a small map of the environment, exact local lights, indirect light.
+    def receivers(self, *, is_lit: bool) -> ShadingPoints:
+        """Return the points without rays."""
+        return self.points
 
-        Indirect light uses the baked normals, since tracing it for overridden normals takes too long.
-        """
-        transfer, indirect_rays = self.transfer, tuple[RayList, ...]()
-        if self.gather_rays is not None:
-            indirect_rays = transfer.indirect_rays(with_baked_normals(light), self.gather_rays, self.mirror_visibility)
-        local = transfer.local.rays_to(light, self.receivers.points)
-        return transfer.preview_lights_for(light), replace(self.receivers, rays=(*indirect_rays, *local))
+    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
+        """Return the gather rays, without light."""
+        return self.stored_rays
+
+    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights; shadows are traced."""
+        return self.local.rays_to(light, points)
 
 
 def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:

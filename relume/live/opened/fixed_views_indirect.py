@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -12,26 +12,22 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
-from relume.live.fixed_camera.illumination import Illumination, Normals
-from relume.live.fixed_camera.protocols import EditAxis
-from relume.live.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer, read_fields
+from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
+from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
+from relume.live.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples, read_fields
 from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.patch_direct_light import DirectPatchLight
-from relume.live.opened.planar_mirror_light import AddedMirrorLights, MirrorLightTransfer
+from relume.live.opened.planar_mirror_light import MirrorLightTransfer
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.stored_patches import read_patches
 from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
-from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.store.bake_protocol import StoreReader
-from relume.transport.outgoing_patch_light import isotropic
-from relume.transport.shading_points import GatherRays, RayList
+from relume.transport.shading_points import RayList
 from relume.views.view import View
-
-_NO_LIGHT = isotropic(np.zeros((NO_PATCH + 1, 3), np.float32))
 
 
 @dataclass(frozen=True)
@@ -56,36 +52,37 @@ class BakedIndirectViews(BakedFixedViews):
 
     @cached_property
     def indirect(self) -> IndirectSolver:
-        """Solver for the outgoing light of the patches."""
+        """Solver for the light of patches at samples, which see virtual lights in planar mirrors as well."""
+        return self._solver(self.mirror_light)
+
+    @cached_property
+    def indirect_at_probes(self) -> IndirectSolver:
+        """Solver for the light of patches at probes, which store no visibility of virtual lights."""
+        return self._solver(None)
+
+    def _solver(self, mirror_light: MirrorLightTransfer | None) -> IndirectSolver:
         direct_light = DirectPatchLight(self.patches, *self._direct_light_args, self.harmonic)
-        return IndirectSolver(direct_light, self._normal_mapped_direct_light, self.cache, self.key)
+        return IndirectSolver(direct_light, self._normal_mapped_direct_light, mirror_light, self.cache, self.key)
 
-    def _normal_mapped_direct_light(self, normals: Normals) -> DirectPatchLight:
+    def _normal_mapped_direct_light(self, normals: Normals, is_canceled: Callable[[], bool]) -> DirectPatchLight:
         """Return the direct light of patches with normal-map overrides: one image per material, None for none."""
-        return DirectPatchLight(
-            self._normal_mapped_patches(normals), *self._direct_light_args, normal_overrides=(normals,)
-        )
-
-    def _normal_mapped_patches(self, normals: Normals, is_canceled: Callable[[], bool] = lambda: False) -> PatchLight:
         key = self.key, "patches with mapped normals", normals
-        return self.cache.get_value(key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled))
-
-    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Trace missing rays of patches with overridden normals. See `FixedViewTransfer`."""
-        if any(normals := light.normals):
-            self._normal_mapped_patches(normals, is_canceled)
+        patches = self.cache.get_value(
+            key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled)
+        )
+        return DirectPatchLight(patches, *self._direct_light_args, normal_overrides=(normals,))
 
     @property
-    def _direct_light_args(self) -> tuple[LocalLights, IntegrateEnvironment, IntegrateEnvironment, Cache, str]:
+    def _direct_light_args(self) -> tuple[LocalLights, FindLights, Cache, str]:
         """Arguments of `DirectPatchLight`."""
-        return self.local, self.light_of_environment, self.preview_light_of_environment, self.cache, self.key
+        return self.local, self.environment_lights, self.cache, self.key
 
     @cached_property
     def mirror_light(self) -> MirrorLightTransfer | None:
         """Light of planar mirrors in any look."""
         if self.mirror_lights is None:
             return None
-        return MirrorLightTransfer(self.mirror_lights, self.patches, self.light_of_environment, self.cache, self.key)
+        return MirrorLightTransfer(self.mirror_lights, self.patches, self.environment_lights, self.cache, self.key)
 
     @cached_property
     def tracer(self) -> NormalRetracer:
@@ -97,47 +94,11 @@ class BakedIndirectViews(BakedFixedViews):
         """Spherical-harmonic transfer to probes and patches, if baked."""
         return read_harmonic_light(self.store, self.patches)
 
-    def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
-        """Return the rays of incident light: from patches and local lights."""
-        local = super()._rays(view, material, light, cache)
-        if not light.paths.has_indirect:
-            return local
-        rays, mirror_visibility = view.gather_rays(material, _NO_LIGHT), self.mirror_lights_of(view, material)
-        return (*self.indirect_rays(light, rays, mirror_visibility), *local)
-
-    def indirect_rays(
-        self,
-        light: Illumination,
-        gather_rays: GatherRays,
-        mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None,
-    ) -> tuple[RayList, ...]:
-        """Return the rays that carry indirect illumination to samples. See `BakedFixedViews`."""
-        mirror_light = self.mirror_light
-        if mirror_visibility is None or mirror_light is None or not mirror_light.is_in(light):
-            return super().indirect_rays(light, gather_rays, mirror_visibility)
-        outgoing = self.indirect.excluding(light, mirror_light.patch_part)
-        return replace(gather_rays, outgoing=outgoing), mirror_light.rays(light, mirror_visibility)
-
-    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
-        """Return the lights that a material's samples see in planar mirrors."""
-        if self.mirror_lights is None:
-            return None
-        rows = view.rows(material)
-
-        def read() -> NDArray[np.uint8]:
-            return view.store.read(f"views/{view.index}/mirror_lights", rows.start, rows.stop)
-
-        return self.cache.transient.get_value((self.key, "mirror lights", *view.sample_key(material)), read)
-
-    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
-        """Return the change of light from planar mirrors. See `FixedViewTransfer`."""
-        return None if self.mirror_light is None else self.mirror_light.delta(before, after)
-
-    def subset(
+    def selected_samples(
         self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
-    ) -> SampledTransfer:
+    ) -> SelectedSamples:
         """Select samples of a material. See `FixedViewTransfer`."""
-        samples = super().subset(view, material, sample_indices, has_indirect=has_indirect)
+        samples = super().selected_samples(view, material, sample_indices, has_indirect=has_indirect)
         if not has_indirect:
             return samples
         mirror_visibility = (
@@ -145,8 +106,21 @@ class BakedIndirectViews(BakedFixedViews):
             if self.mirror_lights is None
             else np.asarray(view.read_rows("mirror_lights", material, sample_indices), np.uint8)
         )
-        return replace(
-            samples,
-            gather_rays=view.subset_rays(material, sample_indices, _NO_LIGHT),
-            mirror_visibility=mirror_visibility,
-        )
+        gather_rays = view.subset_rays(material, sample_indices)
+        return replace(samples, stored_rays=gather_rays, mirror_visibility=mirror_visibility)
+
+    def _indirect_rays(
+        self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
+    ) -> tuple[RayList, ...]:
+        """Return the rays from patches, and those from virtual lights in planar mirrors."""
+        gather_rays = samples.gather_rays(is_canceled)
+        if gather_rays is None:
+            return ()
+        # in a preview, tracing overridden normals takes too long
+        reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
+        rays = replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled))
+        mirror_light = self.mirror_light
+        if mirror_light is None or not mirror_light.is_in(light):
+            return (rays,)
+        assert samples.mirror_visibility is not None  # stored with the gather rays
+        return rays, mirror_light.virtual_lights(light).rays(samples.mirror_visibility)

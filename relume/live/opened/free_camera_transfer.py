@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from relume.core.cache import Cache
 from relume.core.jackknife import JackknifeEstimate
 from relume.lights.spherical_triangles import TriangleLights
-from relume.live.fixed_camera.illumination import Illumination, LightSource
-from relume.live.fixed_camera.protocols import CameraMode, EditAxis
+from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment
+from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality
 from relume.live.free_camera.environment_lookup import EnvironmentLookup
 from relume.live.free_camera.free_view import FreeView
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight, hard_shadow_lights, local_shadow_targets
@@ -197,13 +197,15 @@ class BakedFreeCamera:
     def _vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
         probes = self.stored_scene.probes
         rays: list[RayList] = list(self.light_transport.local.rays_to(element, probes, is_coarse=True))
-        outgoing = self.light_transport.outgoing_patch_light(element)
-        if outgoing is not None:
+        if element.paths.has_indirect:
+            outgoing = self.light_transport.indirect_at_probes.outgoing_light(element)
             rays.append(GatherRays(self._gather_hits, self._pattern, outgoing))
-        lights = (
-            self.sun_disks.remaining_lights(element) if without_sun_disks else self.light_transport.lights_for(element)
-        )
+        lights = self._direct_lights(element, LightQuality.EXACT, without_sun_disks)
         return incident_coefficients(probes, self.visible, lights, rays)
+
+    def _direct_lights(self, element: Illumination, quality: LightQuality, without_sun_disks: bool) -> TriangleLights:
+        find_lights = self.sun_disks.remaining_lights if without_sun_disks else self.light_transport.direct_lights
+        return find_lights(element, quality)
 
     def fast_vectors(
         self, element: Illumination, probe_indices: Shaped[NDArray[np.intp], " m"], without_sun_disks: bool = False
@@ -219,14 +221,12 @@ class BakedFreeCamera:
                 visible = self.light_transport.local.preview(source.geometry, probes).visible
                 rays.append(self.light_transport.local.preview_rays(source, visible))
         vectors = ray_incident_coefficients(probes, rays, FAST_DEGREE)
-        find_lights = (
-            self.sun_disks.preview_remaining_lights if without_sun_disks else self.light_transport.preview_lights_for
-        )
-        lights = find_lights(element)
+        lights = self._direct_lights(element, LightQuality.PREVIEW, without_sun_disks)
         if lights.num_lights:
             vectors += self._preview_environment(lights, probes, probe_indices)
         if element.paths.has_indirect:
-            vectors += self._ray_vectors(self.light_transport.indirect.fast(element), probe_indices)
+            solution = self.light_transport.indirect_at_probes.solve_indirect(element, LightQuality.PREVIEW)
+            vectors += self._ray_vectors(solution.along_rays(), probe_indices)
         return vectors
 
     def indirect_delta(
@@ -237,7 +237,8 @@ class BakedFreeCamera:
         Args:
             before, after: lights of the same sources. probe_indices: the probes.
         """
-        return self._ray_vectors(self.light_transport.indirect.delta(before, after), probe_indices)
+        change = self.light_transport.indirect_at_probes.solve_indirect(after, LightQuality.EXACT, start_from=before)
+        return self._ray_vectors(change.along_rays(), probe_indices)
 
     def _ray_vectors(self, outgoing: OutgoingLight, probe_indices: NDArray[np.intp]) -> F32:
         return shared_direction_coefficients(
@@ -326,9 +327,9 @@ class BakedFreeCamera:
     def _unoccluded_environment(self, light: Illumination, probes: SurfacePoints, *, is_preview: bool) -> F32:
         """Return the radiance of white probes under the whole environment, per distinct normal. (n, 3) float32"""
         _, first, normal_index = np.unique(probes.normal, axis=0, return_index=True, return_inverse=True)
-        lights, receivers = self.light_transport.unoccluded_environment(
-            light, probes.rows(first), is_preview=is_preview
-        )
+        quality = LightQuality.PREVIEW if is_preview else LightQuality.EXACT
+        samples = self.light_transport.unoccluded_samples(probes.rows(first))
+        lights, receivers = self.light_transport.incident_light(samples, direct_environment(light), quality)
         # the first function is constant: its coefficient is proportional to the irradiance
         constant = incident_coefficients(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
         return np.asarray(constant[normal_index.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)

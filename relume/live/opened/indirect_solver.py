@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -10,163 +11,207 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, equal_up_to_reflectances
+from relume.live.fixed_camera.protocols import LightQuality, RaysToSamples
 from relume.live.opened.patch_direct_light import DirectPatchLight
-from relume.patches.patch_kdtree import NO_PATCH
+from relume.live.opened.planar_mirror_light import MirrorLightTransfer, VirtualLights
 from relume.radiosity.highlight_transport import outgoing_in_highlights
-from relume.radiosity.outgoing_radiance import OutgoingHighlights, OutgoingRadiance
+from relume.radiosity.outgoing_radiance import OutgoingHighlights, OutgoingRadiance, isotropic_radiance
+from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import ReflectanceOperator
-from relume.radiosity.solve_bounces import solve_indirect, solve_indirect_fast, solve_indirect_preview
-from relume.transport.outgoing_patch_light import OutgoingLight, isotropic
+from relume.radiosity.solve_bounces import Directions, solve_bounces
+from relume.transport.outgoing_patch_light import OutgoingLight
+from relume.views.view import View
 
 F32 = NDArray[np.float32]
+
+
+class IndirectSolution(NamedTuple):
+    """Outgoing radiance of patches, or its change; a `relume.live.fixed_camera.protocols.PatchRadiance`.
+
+    Attributes:
+        patches: the patches, with the normals that they were solved for. outgoing: their radiance.
+        virtual_lights: in planar mirrors, which samples receive along rays of their own; None for none.
+    """
+
+    patches: PatchLight
+    outgoing: OutgoingRadiance
+    virtual_lights: VirtualLights | None = None
+
+    def along_rays(self) -> OutgoingLight:
+        """Tabulate the radiance for lookups along gather rays."""
+        return self.outgoing.outgoing_light(self.patches)
+
+    def mean_to_others(self) -> Shaped[F32, "patches 3"]:
+        """Return the mean radiance of each patch toward other patches."""
+        return self.outgoing.mean_to_others(self.patches)
+
+    def rays_to(self, view: View, material: int) -> RaysToSamples | None:
+        """Return the light that samples of a material receive from virtual lights; None if there is none."""
+        if self.virtual_lights is None or not self.virtual_lights.normal_irradiance.any():
+            return None
+        visible = view.mirror_lights(material)
+        sample_indices = np.flatnonzero(visible.any(axis=1))
+        return RaysToSamples(sample_indices, self.virtual_lights.rays(visible[sample_indices]))
+
+
+class _Approximation(NamedTuple):
+    """Approximations of a solution.
+
+    Attributes:
+        has_exact_lights: direct light of all samples and light triangles, and with the look's normal maps.
+        has_sharp_highlights: tables of sharp highlights, else their low-degree basis.
+        directions: of light between patches.
+    """
+
+    has_exact_lights: bool
+    has_sharp_highlights: bool
+    directions: Directions
+
+
+_EXACT = _Approximation(True, True, Directions.EXACT)
+_PREVIEW = _Approximation(False, False, Directions.BINNED)
+_EXACT_CHANGE = _Approximation(True, True, Directions.BINNED)
+_CHANGE_OF_SURFACES = _Approximation(True, False, Directions.BINNED)
+_CHANGE_OF_LIGHTS = _Approximation(False, False, Directions.NONE)
 
 
 class IndirectSolver:
     """Indirect illumination from patches; thread-safe.
 
-    Incremental updates use the baked normals, for both ends of an edit alike.
-
     Args:
         direct_light: direct illumination of the patches.
-        find_direct_light: returns the same for normal-map overrides, by the image of each material.
-        key: key of the bake in `cache`.
+        find_direct_light: returns the same for normal-map overrides, by the image of each material; polls a
+            cancellation while it traces missing rays.
+        mirror_light: virtual lights of planar mirrors; None if receivers get their light from the patches.
+        cache: cache of results computed from the bake. key: key of the bake in it.
     """
 
     def __init__(
         self,
         direct_light: DirectPatchLight,
-        find_direct_light: Callable[[Normals], DirectPatchLight],
+        find_direct_light: Callable[[Normals, Callable[[], bool]], DirectPatchLight],
+        mirror_light: MirrorLightTransfer | None,
         cache: Cache,
         key: str,
     ) -> None:
-        self._direct_light, self._find_direct_light, self._patches = (
-            direct_light,
-            find_direct_light,
-            direct_light.patches,
-        )
-        self.num_patches = self._patches.num_patches
-        self._cache, self._key = cache, key
+        self._direct_light, self._find_direct_light = direct_light, find_direct_light
+        self._mirror_light, self._cache, self._key = mirror_light, cache, key
 
-    def exact(self, light: Illumination) -> OutgoingLight:
-        """Return the outgoing light for exact images."""
-        indirect = _without_direct(light)
-        return self._cache.get_value((self._key, "indirect light", indirect), lambda: self._outgoing_light(indirect))
+    def solve_indirect(
+        self,
+        light: Illumination,
+        quality: LightQuality,
+        start_from: Illumination | None = None,
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> IndirectSolution:
+        """Solve for the outgoing radiance of all patches, or for its change.
 
-    def excluding(self, light: Illumination, excluded: Callable[[Illumination], OutgoingRadiance]) -> OutgoingLight:
-        """Return exact light without the part that `excluded` returns, which is displayed by other means."""
-        indirect = _without_direct(light)
+            L = Σ_b L^b,   L^b = F t^b,   t^(b+1)(c) = π / N Σ_r L^b(hit(c, r), −ω_r) h(ω_r)
 
-        def compute() -> OutgoingLight:
-            return (
-                self._outgoing(indirect)
-                .subtract(excluded(indirect))
-                .outgoing_light(self._direct_light_for(indirect).patches)
-            )
+        t^0 is direct light, and b runs over the bounces of the light. L^1 excludes the light of planar mirrors that
+        samples receive from virtual lights.
 
-        return self._cache.get_value((self._key, "indirect light without mirror lights", indirect), compute)
+        Exact light from scratch leaves nothing out. Otherwise these are approximate, for a change at both ends alike,
+        so that errors cancel:
 
-    def preview(self, light: Illumination) -> Shaped[F32, "patches 3"]:
-        """Return isotropic light for incremental updates of an active edit; never waits for exact light."""
-        indirect = _without_direct(light)
-        key = self._key, "indirect light, preview", indirect
-        return self._cache.transient.get_value(key, lambda: self._preview(indirect))
+        | quality | change | direct light | sharp highlights | directions between patches | late bounces |
+        |---|---|---|---|---|---|
+        | exact | any | | | bins | few rays |
+        | preview | none | few samples, small maps | low degree | bins | few rays |
+        | preview | surfaces | | low degree | bins | few rays |
+        | preview | lights | few samples, small maps | low degree | none after the first bounce | few rays |
 
-    def fast(self, light: Illumination) -> OutgoingLight:
-        """Return approximate light for free-camera images during an edit of a light."""
-        return self._fast(_without_direct(light), is_preview=True).outgoing_light(self._patches)
-
-    def preview_delta(self, before: Illumination, after: Illumination) -> Shaped[F32, "patches 3"]:
-        """Return the change of isotropic radiance; both ends are approximated alike, so that errors cancel.
-
-        If only materials have changed, light between patches keeps its directions through highlights, and the result is
-        averaged over directions at the end.
-        """
-        if equal_up_to_reflectances(before, after):
-            return self._delta(before, after).mean_to_others(self._patches)
-        change = self.preview(after) - self.preview(before)
-        return change[: self.num_patches]
-
-    def delta(self, before: Illumination, after: Illumination) -> OutgoingLight:
-        """Approximate the change of outgoing light for unchanged lights with exact direct illumination.
-
-        Both ends are approximated alike, so that errors cancel.
+        All of them use the baked normals.
 
         Args:
-            before, after: light of the same sources.
+            light: the illumination. quality: see above.
+            start_from: light of an earlier solution; None: from scratch.
+            is_canceled: polled while rays of overridden normals are traced.
+        Raises:
+            CancelledError: `is_canceled` returned true.
         """
-        return self._delta(before, after, is_sharp=True).outgoing_light(self._patches)
+        if start_from is None:
+            approximation = _PREVIEW if quality is LightQuality.PREVIEW else _EXACT
+            return self._solve(_indirect_only(light), approximation, is_canceled)
+        if quality is not LightQuality.PREVIEW:
+            approximation = _EXACT_CHANGE
+        elif equal_up_to_reflectances(start_from, light):
+            approximation = _CHANGE_OF_SURFACES
+        else:
+            approximation = _CHANGE_OF_LIGHTS
+        before, after = (self._solve(_indirect_only(each), approximation, is_canceled) for each in (start_from, light))
+        virtual_lights = None if self._mirror_light is None else self._mirror_light.virtual_lights(light, start_from)
+        return IndirectSolution(after.patches, after.outgoing.subtract(before.outgoing), virtual_lights)
 
-    def _delta(self, before: Illumination, after: Illumination, *, is_sharp: bool = False) -> OutgoingRadiance:
-        outgoing_before, outgoing_after = (
-            self._fast(_without_direct(light), is_preview=False, is_sharp=is_sharp) for light in (before, after)
-        )
-        return outgoing_after.subtract(outgoing_before)
+    def outgoing_light(self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False) -> OutgoingLight:
+        """Return the exact solution, tabulated for gather rays and cached. See `solve_indirect`."""
+        indirect = _indirect_only(light)
 
-    def _fast(self, light: Illumination, *, is_preview: bool, is_sharp: bool = False) -> OutgoingRadiance:
-        """Return outgoing radiance. is_preview: approximates lights. is_sharp: sharp highlights use tables."""
+        def solve() -> OutgoingLight:
+            return self.solve_indirect(light, LightQuality.EXACT, is_canceled=is_canceled).along_rays()
+
+        return self._cache.get_value((self._key, "indirect light", indirect, self._has_mirror_light(indirect)), solve)
+
+    def _has_mirror_light(self, light: Illumination) -> bool:
+        return self._mirror_light is not None and self._mirror_light.is_in(light)
+
+    def _solve(
+        self, light: Illumination, approximation: _Approximation, is_canceled: Callable[[], bool]
+    ) -> IndirectSolution:
+        is_exact, direct_light = approximation == _EXACT, self._direct_light
+        if not light.paths.has_indirect:
+            return IndirectSolution(
+                direct_light.patches, isotropic_radiance(np.zeros((direct_light.patches.num_patches, 3), np.float32))
+            )
+        if is_exact and any(light.normals):
+            direct_light = self._find_direct_light(light.normals, is_canceled)
 
         def compute() -> OutgoingRadiance:
-            reflectance_operator = self._reflectance_operator(light, self._cache.transient)
-            incident = self._direct_light.incident_light(light, reflectance_operator, is_preview=is_preview)
-            outgoing_highlights = (
-                self._outgoing_highlights(light, reflectance_operator, self._direct_light) if is_sharp else None
-            )
-            return solve_indirect_fast(
-                self._patches, reflectance_operator, incident, light.paths.first, light.paths.last, outgoing_highlights
-            )
+            return self._bounces(light, approximation, direct_light)
 
-        key = self._key, "indirect light, fast", light, is_preview, is_sharp
-        return self._cache.transient.get_value(key, compute)
-
-    def _outgoing_light(self, light: Illumination) -> OutgoingLight:
-        if not light.paths.has_indirect:
-            return isotropic(np.zeros((NO_PATCH + 1, 3), np.float32))
-        return self._outgoing(light).outgoing_light(self._direct_light_for(light).patches)
-
-    def _direct_light_for(self, light: Illumination) -> DirectPatchLight:
-        """Return the direct light of patches with the look's normal maps."""
-        return self._find_direct_light(light.normals) if any(light.normals) else self._direct_light
-
-    def _outgoing(self, light: Illumination) -> OutgoingRadiance:
-        reflectance_operator, direct_light = (
-            self._reflectance_operator(light, self._cache),
-            self._direct_light_for(light),
-        )
-        incident = direct_light.incident_light(light, reflectance_operator, is_preview=False)
-        outgoing_highlights = self._outgoing_highlights(light, reflectance_operator, direct_light)
-        return solve_indirect(
-            direct_light.patches,
-            reflectance_operator,
-            incident,
-            light.paths.first,
-            light.paths.last,
-            outgoing_highlights,
+        key = self._key, "indirect light, approximate", light, approximation
+        outgoing = compute() if is_exact else self._cache.transient.get_value(key, compute)
+        mirror_light = self._mirror_light
+        if mirror_light is None or not mirror_light.is_in(light):
+            return IndirectSolution(direct_light.patches, outgoing)
+        mirror_part = mirror_light.patch_part(light, is_sharp=approximation.has_sharp_highlights)
+        return IndirectSolution(
+            direct_light.patches, outgoing.subtract(mirror_part), mirror_light.virtual_lights(light)
         )
 
-    @staticmethod
-    def _outgoing_highlights(
-        light: Illumination, reflectance_operator: ReflectanceOperator, direct_light: DirectPatchLight
-    ) -> OutgoingHighlights:
-        """Return the direct light reflected by sharp highlights."""
-        highlights = direct_light.patches.highlight_tables(light.reflectances, reflectance_operator)
-        return highlights, outgoing_in_highlights(
-            direct_light.patches, highlights, direct_light.direct(light, highlights.rows)
+    def _bounces(
+        self, light: Illumination, approximation: _Approximation, direct_light: DirectPatchLight
+    ) -> OutgoingRadiance:
+        """Return the radiance of the patches, with all light of planar mirrors."""
+        cache = self._cache if approximation == _EXACT else self._cache.transient
+        patches, reflectances = direct_light.patches, light.reflectances
+        reflectance_operator = cache.get_value(
+            (self._key, "reflectance", reflectances), lambda: patches.reflectance_operator(reflectances)
+        )
+        incident = direct_light.incident_light(
+            light, reflectance_operator, is_preview=not approximation.has_exact_lights
+        )
+        outgoing_highlights = (
+            _outgoing_highlights(light, reflectance_operator, direct_light)
+            if approximation.has_sharp_highlights
+            else None
+        )
+        first, last = light.paths.first, light.paths.last
+        return solve_bounces(
+            patches, reflectance_operator, incident, first, last, outgoing_highlights, approximation.directions
         )
 
-    def _preview(self, light: Illumination) -> F32:
-        if not light.paths.has_indirect:
-            return np.zeros((NO_PATCH + 1, 3), np.float32)
-        reflectance_operator = self._reflectance_operator(light, self._cache.transient)
-        incident = self._direct_light.incident_light(light, reflectance_operator, is_preview=True)
-        return solve_indirect_preview(
-            self._patches, reflectance_operator, incident, light.paths.first, light.paths.last
-        )
 
-    def _reflectance_operator(self, light: Illumination, cache: Cache) -> ReflectanceOperator:
-        key, reflectances = (self._key, "reflectance", light.reflectances), light.reflectances
-        return cache.get_value(key, lambda: self._patches.reflectance_operator(reflectances))
+def _outgoing_highlights(
+    light: Illumination, reflectance_operator: ReflectanceOperator, direct_light: DirectPatchLight
+) -> OutgoingHighlights:
+    """Return the direct light reflected by sharp highlights."""
+    highlights = direct_light.patches.highlight_tables(light.reflectances, reflectance_operator)
+    return highlights, outgoing_in_highlights(
+        direct_light.patches, highlights, direct_light.direct(light, highlights.rows)
+    )
 
 
-def _without_direct(light: Illumination) -> Illumination:
+def _indirect_only(light: Illumination) -> Illumination:
     """Return the part of a light that the patches depend on."""
     return light._replace(paths=light.paths.without_direct())

@@ -14,6 +14,7 @@ from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, emitter_geometry
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.harmonic_light import HarmonicLight
 from relume.live.opened.local_lights import LocalLights
 from relume.look import EnvironmentKey, LightGeometry
@@ -102,7 +103,6 @@ class DirectPatchLight:
 
     Args:
         patches: the receivers. local: local lights. find_lights: returns the triangles of an environment.
-        find_preview_lights: approximates them.
         cache: cache of results computed from the bake. key: key of the bake in it.
         harmonic: transfer of low-frequency light, for previews; None if a bake has none.
         normal_overrides: identifies overridden normals; empty for the baked ones.
@@ -112,16 +112,15 @@ class DirectPatchLight:
         self,
         patches: PatchLight,
         local: LocalLights,
-        find_lights: Callable[[EnvironmentKey], TriangleLights],
-        find_preview_lights: Callable[[EnvironmentKey], TriangleLights],
+        find_lights: Callable[[EnvironmentKey, LightQuality], TriangleLights],
         cache: Cache,
         key: str,
         harmonic: HarmonicLight | None = None,
         normal_overrides: tuple[Hashable, ...] = (),
     ) -> None:
         self.patches, self._local = patches, LocalPatchLight(local, patches, cache, key, normal_overrides)
-        self._find_lights, self._find_preview_lights = find_lights, find_preview_lights
-        self._cache, self._key, self._harmonic, self._normal_overrides = cache, key, harmonic, normal_overrides
+        self._find_lights, self._cache, self._key = find_lights, cache, key
+        self._harmonic, self._normal_overrides = harmonic, normal_overrides
 
     def incident_light(
         self, light: Illumination, reflectance_operator: ReflectanceOperator, *, is_preview: bool
@@ -157,21 +156,24 @@ class DirectPatchLight:
         rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in local_rays]
         if not light.has_environment:
             return DirectLobes(rays=rays)
-        lights = self._find_lights(light.environment)
+        lights = self._exact_lights(light.environment)
         gain = np.array(light.environment_gain, np.float32)
         return DirectLobes(
             replace(lights, irradiance=gain * lights.irradiance), self.patches.visibility_bits(rows), rays
         )
 
+    def _exact_lights(self, environment: EnvironmentKey) -> TriangleLights:
+        return self._find_lights(environment, LightQuality.EXACT)
+
     def _irradiance(self, environment: EnvironmentKey, is_preview: bool) -> F32:
         key = self._key, "environment on patches", environment, *self._normal_overrides
         if not is_preview or self._cache.contains(key):
-            return self._cache.get_value(key, lambda: self.patches.irradiance(self._find_lights(environment)))
+            return self._cache.get_value(key, lambda: self.patches.irradiance(self._exact_lights(environment)))
         preview_key = *key, "preview"
         return self._cache.transient.get_value(preview_key, lambda: self._preview_irradiance(environment))
 
     def _preview_irradiance(self, environment: EnvironmentKey) -> F32:
-        lights, harmonic = self._find_preview_lights(environment), self._harmonic
+        lights, harmonic = self._find_lights(environment, LightQuality.PREVIEW), self._harmonic
         if harmonic is None:
             return self.patches.irradiance(lights)
         split = harmonic.frequency_split(lights)
@@ -193,11 +195,12 @@ class DirectPatchLight:
             preview_key = *key, "preview"
             return self._cache.transient.get_value(preview_key, lambda: self._preview_coefficients(environment, rows))
         return self._cache.get_value(
-            key, lambda: patches.incident_coefficients(rows, self._find_lights(environment), OUTGOING_DEGREE)
+            key,
+            lambda: patches.incident_coefficients(rows, self._exact_lights(environment), OUTGOING_DEGREE),
         )
 
     def _preview_coefficients(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> F32:
-        lights, harmonic, patches = self._find_preview_lights(environment), self._harmonic, self.patches
+        lights, harmonic, patches = self._find_lights(environment, LightQuality.PREVIEW), self._harmonic, self.patches
         if harmonic is None:
             return patches.incident_coefficients(rows, lights, PATCH_DEGREE)
         split = harmonic.frequency_split(lights)

@@ -12,7 +12,8 @@ with the irradiance E of a group of lights in direction d, and the mirror's refl
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -25,6 +26,7 @@ from relume.camera.planar_mirrors import mirrored_lights
 from relume.core.cache import Cache
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.look import EnvironmentKey
 from relume.math.zernike import OUTGOING_DEGREE
 from relume.methods.mirror_lights import NO_PLANE, MirrorLights
@@ -37,21 +39,18 @@ from relume.transport.shading_points import MirrorRays
 F32 = NDArray[np.float32]
 
 
-@dataclass(frozen=True)
-class AddedMirrorLights:
-    """Change of the light of planar mirrors; a `relume.live.fixed_camera.protocols.MirrorLightsDelta`.
+class VirtualLights(NamedTuple):
+    """Distant lights in the directions of mirror images.
 
     Attributes:
-        direction: direction of the virtual lights. normal_irradiance: change of irradiance perpendicular to it.
-        patch_radiance: change of the mean radiance to other patches, which samples do not receive.
+        direction: unit direction of each light. normal_irradiance: irradiance perpendicular to it.
     """
 
     direction: Shaped[F32, "K 3"]
     normal_irradiance: Shaped[F32, "K 3"]
-    patch_radiance: Shaped[F32, "patches 3"]
 
     def rays(self, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
-        """Return the rays to samples. visible: visibility of the virtual lights."""
+        """Return the rays to samples. visible: visibility of these lights, see `lights_visible_in_mirrors`"""
         return MirrorRays(self.direction, self.normal_irradiance, visible)
 
 
@@ -68,7 +67,7 @@ class MirrorLightTransfer:
         self,
         mirror_lights: MirrorLights,
         patches: PatchLight,
-        find_lights: Callable[[EnvironmentKey], TriangleLights],
+        find_lights: Callable[[EnvironmentKey, LightQuality], TriangleLights],
         cache: Cache,
         key: str,
     ) -> None:
@@ -81,41 +80,23 @@ class MirrorLightTransfer:
         """True if a light includes light of mirrors: environment light with one or more bounces."""
         return light.paths.has_indirect and light.paths.first == 1 and light.has_environment
 
-    def rays(self, light: Illumination, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
-        """Return the rays to samples.
-
-        Args:
-            light: for which `is_in` is true.
-            visible: visibility of the virtual lights, see `lights_visible_in_mirrors`.
-        """
-        return MirrorRays(self._directions, self._reflected_irradiance(light), visible)
-
-    def delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
-        """Return the change after an edit of surfaces, such as a mirror's color; None if there is none.
-
-        Args:
-            before, after: in the same environment.
-        """
-        irradiance_before, irradiance_after = (
-            self._reflected_irradiance(light) if self.is_in(light) else np.float32(0) for light in (before, after)
-        )
-        change = np.asarray(irradiance_after - irradiance_before, np.float32)
-        if not change.any():
-            return None
-        patch_radiances = [
-            self._fast_patch_part(light).mean_to_others(self._patches) if self.is_in(light) else 0
-            for light in (before, after)
-        ]
-        return AddedMirrorLights(
-            self._directions, change, np.asarray(patch_radiances[1] - patch_radiances[0], np.float32)
-        )
+    def virtual_lights(self, light: Illumination, start_from: Illumination | None = None) -> VirtualLights:
+        """Return the virtual lights, or their change since another light of the same environment."""
+        irradiance = self._reflected_irradiance(light)
+        if start_from is not None:
+            irradiance = irradiance - self._reflected_irradiance(start_from)
+        return VirtualLights(self._directions, irradiance)
 
     def _reflected_irradiance(self, light: Illumination) -> F32:
         """Irradiance of each virtual light, perpendicular to its direction. (P G, 3) float32"""
+        if not self.is_in(light):
+            return np.zeros((len(self._directions), 3), np.float32)
         mirror_lights, gain = self._mirror_lights, np.array(light.environment_gain)
         incident = np.zeros((len(mirror_lights.direction), 3))
         np.add.at(
-            incident, mirror_lights.group, gain * self._find_lights(light.environment).irradiance[mirror_lights.lights]
+            incident,
+            mirror_lights.group,
+            gain * self._lights_of(light.environment).irradiance[mirror_lights.lights],
         )
         cosine, tints = np.abs(mirror_lights.mirrors.normal @ mirror_lights.direction.T), self._patches.textures[1]
         mirror_reflectance = np.zeros((*cosine.shape, 3))
@@ -126,11 +107,25 @@ class MirrorLightTransfer:
             mirror_reflectance[p] = specular_terms(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
         return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
 
-    def patch_part(self, light: Illumination) -> OutgoingRadiance:
-        """Return the part of the patches' outgoing radiance, as in exact images, that mirror lights replace."""
-        mirror_reflectances, lights = _mirror_reflectances(light.reflectances), self._bright_lights(light.environment)
-        reflectance_operator, incident = self._patch_light(light, mirror_reflectances)
-        highlights = self._patches.highlight_tables(mirror_reflectances, reflectance_operator)
+    def patch_part(self, light: Illumination, *, is_sharp: bool) -> OutgoingRadiance:
+        """Return the part of the patches' outgoing radiance that virtual lights replace.
+
+        Args:
+            light: for which `is_in` is true. is_sharp: sharp highlights use tables, else the low-degree basis.
+        """
+        reflectances = _mirror_reflectances(light.reflectances)
+        if is_sharp:
+            return self._patch_part(light, reflectances, is_sharp=True)
+        # equal for all colors and curves of other materials, of which an edit changes one per frame
+        key = self._key, "mirror light of patches", light.environment, light.environment_gain, reflectances
+        return self._cache.transient.get_value(key, lambda: self._patch_part(light, reflectances, is_sharp=False))
+
+    def _patch_part(self, light: Illumination, reflectances: Reflectances, *, is_sharp: bool) -> OutgoingRadiance:
+        reflectance_operator, incident = self._patch_light(light, reflectances)
+        if not is_sharp:
+            return first_bounce(reflectance_operator, incident)
+        highlights = self._patches.highlight_tables(reflectances, reflectance_operator)
+        lights = self._bright_lights(light.environment)
         lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
         direct_lobes = DirectLobes(lights, self._patches.visibility_bits(highlights.rows, self._light_indices))
         return first_bounce(
@@ -138,10 +133,6 @@ class MirrorLightTransfer:
             incident,
             (highlights, outgoing_in_highlights(self._patches, highlights, direct_lobes)),
         )
-
-    def _fast_patch_part(self, light: Illumination) -> OutgoingRadiance:
-        """Return `patch_part` in the low-degree basis."""
-        return first_bounce(*self._patch_light(light, _mirror_reflectances(light.reflectances)))
 
     def _patch_light(
         self, light: Illumination, mirror_reflectances: Reflectances
@@ -160,13 +151,16 @@ class MirrorLightTransfer:
         )
         return plane_patches, IncidentLight(gain * incident.irradiance, gain[:, None] * incident.coefficients)
 
+    def _lights_of(self, environment: EnvironmentKey) -> TriangleLights:
+        return self._find_lights(environment, LightQuality.EXACT)
+
     @property
     def _light_indices(self) -> NDArray[np.intp]:
         return self._mirror_lights.lights.astype(np.intp)
 
     def _bright_lights(self, environment: EnvironmentKey) -> TriangleLights:
         """Return the traced lights in an environment."""
-        all_lights = self._find_lights(environment)
+        all_lights = self._lights_of(environment)
         return all_lights.select(self._light_indices, all_lights.irradiance[self._light_indices])
 
     def _incident_light(self, environment: EnvironmentKey, rows: NDArray[np.intp]) -> IncidentLight:

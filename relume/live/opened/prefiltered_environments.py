@@ -13,6 +13,7 @@ from relume.assets.environments.equirect import rotate_about_y
 from relume.core.color import luminance
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sun_disks import BRIGHT_LIGHT_BOUNDS, SplitEnvironment, remove_sun_disks
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.free_camera.environment_lookup import EnvironmentLookup, build_environment_lookup
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, build_light_lists
@@ -67,7 +68,9 @@ class PrefilteredEnvironments:
         """Return the light triangles of an environment, listed by direction for lobes of some widths, in `order`."""
 
         def compute() -> LobeLightLists:
-            tile_luminance = luminance(self.light_transport.preview_light_of_environment(environment).irradiance)
+            tile_luminance = luminance(
+                self.light_transport.environment_lights(environment, LightQuality.PREVIEW).irradiance
+            )
             sun_disks = self._split(environment.map).sun_disks
             tile_fractions = np.zeros((len(sun_disks), len(tile_luminance)), np.float32)
             for fractions, sun_disk in zip(tile_fractions, sun_disks, strict=True):
@@ -94,11 +97,8 @@ class PrefilteredEnvironments:
         light_transport, is_fast = self.light_transport, is_preview and environment != BAKED_ENVIRONMENT
 
         def compute() -> EnvironmentLights:
-            lights = (
-                light_transport.preview_light_of_environment(environment)
-                if is_fast
-                else light_transport.light_of_environment(environment)
-            )
+            quality = LightQuality.PREVIEW if is_fast else LightQuality.EXACT
+            lights = light_transport.environment_lights(environment, quality)
             return EnvironmentLights.from_lights(
                 *(values[self.order] for values in (lights.direction, lights.irradiance, light_transport.lights.radius))
             )

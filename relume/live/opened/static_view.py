@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-from relume.live.opened.fixed_views import SampledTransfer
+from relume.live.opened.fixed_views import SelectedSamples
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.local_lights import LocalLights
@@ -108,11 +108,12 @@ class StaticView(BakedIndirectViews):
         """Solver for the outgoing light of the patches."""
         return self.light_transport.indirect
 
-    def subset(
+    def selected_samples(
         self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
-    ) -> SampledTransfer:
+    ) -> SelectedSamples:
         """Select samples of a material, with gather rays if traced. See `FixedViewTransfer`."""
-        return super().subset(view, material, sample_indices, has_indirect=has_indirect and self.reflects)
+        has_rays = has_indirect and self.reflects
+        return super().selected_samples(view, material, sample_indices, has_indirect=has_rays)
 
 
 class StaticTracing:

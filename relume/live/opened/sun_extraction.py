@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.lights.sun_disks import SplitEnvironment, remove_sun_disks
 from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight, sun_shadow_targets, unoccluded_sun_vectors
 from relume.live.opened.fixed_views import BakedFixedViews, displayed_of
 from relume.look import EnvironmentKey
@@ -36,23 +37,17 @@ class SunExtractor:
         """True if a light includes direct illumination by sun disks."""
         return light.has_direct_environment and bool(self._split(light.environment.map).sun_disks)
 
-    def remaining_lights(self, light: Illumination) -> TriangleLights:
+    def remaining_lights(self, light: Illumination, quality: LightQuality) -> TriangleLights:
         """Return the environment triangles for direct illumination, without sun disks."""
+        transport, environment, label = self.light_transport, light.environment, "lights without sun disks"
         if not self.are_in(light):
-            return self.light_transport.lights_for(light)
-        key = self.light_transport.key, "lights without sun disks", light.environment
-        return displayed_of(
-            self.light_transport.cache.get_value(key, lambda: self._integrate_residual(light.environment)), light
+            return transport.direct_lights(light, quality)
+        if quality is LightQuality.PREVIEW:
+            return displayed_of(transport.coarse_weights(label, environment, self._residual_radiance), light)
+        lights = transport.cache.get_value(
+            (transport.key, label, environment), lambda: self._integrate_residual(environment)
         )
-
-    def preview_remaining_lights(self, light: Illumination) -> TriangleLights:
-        """Approximate `remaining_lights`."""
-        if not self.are_in(light):
-            return self.light_transport.preview_lights_for(light)
-        return displayed_of(
-            self.light_transport.coarse_weights("lights without sun disks", light.environment, self._residual_radiance),
-            light,
-        )
+        return displayed_of(lights, light)
 
     def _integrate_residual(self, environment: EnvironmentKey) -> TriangleLights:
         return integrate_environment(

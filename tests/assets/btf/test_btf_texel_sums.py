@@ -139,7 +139,7 @@ def test_light_is_rotated_with_the_rings(bake, small_btf):
     """A rotation by 180° permutes the directions of these rings."""
     texels = TERMS["measured_btf"].normalized({"model": "measured_btf", "data": small_btf.record.data}).texels
     light = illumination_from_look(covered(bake, small_btf.record), bake.material_names, has_bounces=False)
-    incident = bake.incident_light(bake.views["front"], 0, light, bake.cache)
+    incident = bake.incident_light(bake.samples(bake.views["front"], 0, bake.cache), light)
     half = replace(texels, rotation=np.pi)
     rings = texels.btf.grid
     before, after = (texture_light_rows(level_texels, *incident, 0, 40) for level_texels in (texels, half))

@@ -84,7 +84,7 @@ def exact_picture(record, **params):
 def incident_light(bake, look, footprint=0.0):
     """Incident light at the floor and its position in texels of the finest level."""
     light = illumination_from_look(look, bake.material_names, has_bounces=False)
-    lights, receivers = bake.incident_light(bake.views["front"], 0, light, bake.cache)
+    lights, receivers = bake.incident_light(bake.samples(bake.views["front"], 0, bake.cache), light)
     uv = np.array(receivers.uv)
     uv[:, 2] = footprint
     return lights, replace(receivers, uv=uv)

@@ -20,8 +20,8 @@ from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.operator import advance
 from relume.look import BAKED_ENVIRONMENT, LightPaths, validate
 from relume.math.daubechies import analysis, synthesis
-from relume.operators.edit_basis import CurveBasis
-from relume.operators.linear_operator import LinearOperator, precompute
+from relume.operators.edit_basis import CurveBasis, precompute
+from relume.operators.linear_operator import LinearOperator
 
 BALL = "/materials/Ball/terms/1/curves/"
 
@@ -214,7 +214,8 @@ def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is
     view, term = transfer.views["front"], TERMS["cook_torrance"]
     document = with_rise(6.0).materials["Ball"].terms[1]
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
-    operator = precompute(term, bands, "theta_h", transfer.lights, view.receivers(2), lambda s: None, lambda: False)
+    basis = CurveBasis.from_curve(term.curve("theta_h"))
+    operator = precompute(basis, term, bands, transfer.lights, view.receivers(2), lambda s: None, lambda: False)
     perfect = analysis(drawn(6.0))
     largest = np.where(np.abs(perfect) >= np.sort(np.abs(perfect))[-20], perfect, 0)
     exact, approximate = (ref.stream(operator.transport, np.tile(c, (3, 1)), 0) for c in (perfect, largest))

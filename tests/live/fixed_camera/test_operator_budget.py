@@ -15,8 +15,7 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera import operator_budget
 from relume.live.fixed_camera.picture import Picture
 from relume.math.daubechies import analysis
-from relume.operators.linear_operator import operator_bytes, quantized_bytes
-from relume.operators.subsampled import SubsampledOperator
+from relume.operators.linear_operator import operator_bytes
 
 FLOOR, WALL = "/materials/Floor/terms/1/", "/materials/Wall/terms/1/"
 IMAGES = 400_000  # images of the still life and other data of its pictures
@@ -46,7 +45,7 @@ def num_samples(transfer, material):
 def half(transfer):
     """Memory for the floor's operator in 16 bits."""
     num = num_samples(transfer, "Floor")
-    memory = Cache(quantized_bytes(num, 256) + IMAGES)
+    memory = Cache(operator_bytes(num, 256, bits=16) + IMAGES)
     assert memory.budget_bytes < operator_bytes(num, 256)
     return memory
 
@@ -54,7 +53,7 @@ def half(transfer):
 @pytest.fixture
 def small(transfer):
     """Memory for operators of some of the floor's samples only."""
-    return Cache(quantized_bytes(num_samples(transfer, "Floor"), 256) - IMAGES)
+    return Cache(operator_bytes(num_samples(transfer, "Floor"), 256, bits=16) - IMAGES)
 
 
 def drag(picture, transfer, change, pointer, max_coefficients=None):
@@ -96,7 +95,7 @@ def test_a_hundred_drags_in_16_bits_leave_no_error(transfer, half):
 @pytest.mark.parametrize("held", ["curves/theta_h", pytest.param("params/roughness", marks=pytest.mark.slow)])
 def test_a_subsampled_operator_is_used_if_16_bits_are_too_large(transfer, small, monkeypatch, held):
     if held == "params/roughness":  # its few nodes would fit
-        small._state.budget_bytes = quantized_bytes(num_samples(transfer, "Floor"), 12)
+        small._state.budget_bytes = operator_bytes(num_samples(transfer, "Floor"), 12, bits=16)
         monkeypatch.setattr(operator_budget, "_SUBSAMPLED_BUDGET_DIVISOR", 1)
     picture = open_exact_picture(transfer, cache=small)
     before = picture.image()
@@ -104,7 +103,7 @@ def test_a_subsampled_operator_is_used_if_16_bits_are_too_large(transfer, small,
     job = picture.next_job()
     assert kind_of(job) == "operator"
     assert task_of(job).form.step > 1
-    assert isinstance(job.run(lambda fraction: None, lambda: False), SubsampledOperator)
+    assert job.run(lambda fraction: None, lambda: False).interpolation is not None
     run_until_exact(picture)
     drags = [rough(0.35), rough(0.25)]
     if held == "curves/theta_h":
@@ -181,7 +180,7 @@ def test_a_second_curve_of_a_term_waits_for_the_first(transfer, small):
 
 def test_subsampled_operators_include_indirect_light(gathered, monkeypatch):
     monkeypatch.setattr(operator_budget, "_MIN_SAMPLES", 64)
-    memory = Cache(quantized_bytes(num_samples(gathered, "Floor"), 256) - 200_000)
+    memory = Cache(operator_bytes(num_samples(gathered, "Floor"), 256, bits=16) - 200_000)
     picture = run_until_exact(Picture(gathered, "front", memory))
     before = picture.image()
     picture.prepare(FLOOR + "curves/theta_h")

@@ -97,13 +97,14 @@ def test_without_memory_there_is_no_preview(transfer):
 def test_other_samples_are_means_of_their_neighbors(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
-        sparse, rows = choose_samples(transfer, view, material, 0, has_indirect=True), view.rows(material)
+        sparse = choose_samples(transfer, view, material, 0, has_indirect=True)
+        rows = view.rows(material)
         num_samples, num_shaded = sparse.weights.shape
         assert num_samples == rows.stop - rows.start
         assert 0 < num_shaded < num_samples
         np.testing.assert_allclose(sparse.weights.sum(axis=1), 1, rtol=1e-5)
         assert sparse.weights.data.min() > 0
         whole = view.receivers(material)
-        spread = sparse.weights @ sparse.samples.receivers.normal
+        spread = sparse.weights @ sparse.samples.receivers(is_lit=True).normal
         assert np.mean(np.einsum("nc,nc->n", spread, whole.normal)) > 0.9
         assert sparse.num_bytes > sparse.weights.data.nbytes

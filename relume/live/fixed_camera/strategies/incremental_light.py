@@ -30,6 +30,7 @@ from relume.live.fixed_camera.illumination import (
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback, ignore_result
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
+from relume.live.fixed_camera.protocols import LightQuality, RaysToSamples
 from relume.live.fixed_camera.strategies import linear_mix
 from relume.live.fixed_camera.strategies.shading import Shading
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency, smallest_material
@@ -41,9 +42,8 @@ from relume.operators.shade import ShadedTerm, shade_rows, shaded_bytes
 from relume.raytrace.local_light_visibility import compute_irradiance
 from relume.raytrace.moving_light import MovingLight
 from relume.raytrace.surface_points import SurfacePoints
-from relume.transport.outgoing_patch_light import isotropic
 from relume.transport.roughness_ranges import contract_levels
-from relume.transport.shading_points import LocalRays, MirrorRays, ShadingPoints
+from relume.transport.shading_points import LocalRays, ShadingPoints
 from relume.transport.term_contraction import contract
 from relume.views.compose_terms import add_diffuse
 
@@ -93,24 +93,21 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     if rows is not None:
         change = _outgoing_change(images, reference.light, light)
         rows.add(change.coefficients, image)
-        if change.mirrors is not None:
-            mirror_bits = images.transfer.mirror_lights_of(images.view, target.material.index)
-            if mirror_bits is not None:
-                moved_lights.add_mirror_lights(target, change.mirrors.rays(mirror_bits), image)
+        rays = change.radiance.rays_to(images.view, target.material.index)
+        if rays is not None:
+            moved_lights.add_rays(target, rays, image)
     live.set_ready(replace(live.ready, image=image, fidelity=Fidelity.INCREMENTAL, bands=reference.bands, light=light))
 
 
 def _outgoing_change(images: ViewImages, before: Illumination, after: Illumination) -> OutgoingChange:
-    """Return the change of patch radiance and of mirror lights, computed once a frame."""
+    """Return the change of patch radiance, computed once a frame."""
     last = images.outgoing_change
     if last is None or (last.before, last.after) != (before, after):
         indirect = images.transfer.indirect
         assert indirect is not None
-        change = indirect.preview_delta(before, after)
-        mirrors = images.transfer.mirror_lights_delta(before, after)
-        change_in_highlights = change if mirrors is None else change - mirrors.patch_radiance
-        coefficients = haar(change_in_highlights).astype(np.float32)
-        images.outgoing_change = last = OutgoingChange(before, after, coefficients, mirrors)
+        radiance = indirect.solve_indirect(after, LightQuality.PREVIEW, start_from=before)
+        coefficients = haar(radiance.mean_to_others()).astype(np.float32)
+        images.outgoing_change = last = OutgoingChange(before, after, radiance, coefficients)
     return last
 
 
@@ -145,13 +142,9 @@ def _rows_job_of(target: TermTarget) -> Job:
     def precompute(progress: ProgressCallback, is_canceled: CancelCheck) -> IndirectOperator:
         indirect = images.transfer.indirect
         assert indirect is not None
-        radiance, view = indirect.preview(light), images.view
-        receivers, rays = (
-            view.receivers(material.index, is_lit=False),
-            view.gather_rays(material.index, isotropic(radiance)),
-        )
-        expected = expected_light(radiance[: indirect.num_patches])
-        return precompute_rows(term, bands, receivers, rays, expected, progress, is_canceled)
+        radiance, view = indirect.solve_indirect(light, LightQuality.PREVIEW).mean_to_others(), images.view
+        receivers, rays = view.receivers(material.index, is_lit=False), view.gather_rays(material.index)
+        return precompute_rows(term, bands, receivers, rays, expected_light(radiance), progress, is_canceled)
 
     def run(progress: ProgressCallback, is_canceled: CancelCheck) -> IndirectOperator:
         num_bytes = row_bytes(material.num_samples, num_channels(term, bands))
@@ -223,18 +216,18 @@ class _MovedLights:
         if added:
             self._add_moved(material, live, added, out)
 
-    def add_mirror_lights(self, target: TermTarget, rays: MirrorRays, out: Shaped[F32, "tiles 3 lanes"]) -> None:
-        """Add light of planar mirrors to the few samples of a term that receive any.
+    def add_rays(self, target: TermTarget, added: RaysToSamples, out: Shaped[F32, "tiles 3 lanes"]) -> None:
+        """Add light along rays to some samples of a term.
 
         Args:
-            target, out: as in `add_change`. rays: to all samples of its material.
+            target, out: as in `add_change`. added: the rays.
         """
         _, material, live = target
-        lit = np.flatnonzero(rays.visible.any(axis=1))
-        if len(lit):
-            subset = replace(self._images.unlit_samples(material).without_light(lit), rays=[rays.unshared(lit)])
-            tile, offset = np.divmod(lit, out.shape[2])
-            out[tile, :, offset] += self._rows(live, subset, len(lit), None)
+        samples = added.sample_indices
+        if len(samples):
+            receivers = replace(self._images.unlit_samples(material).without_light(samples), rays=[added.rays])
+            tile, offset = np.divmod(samples, out.shape[2])
+            out[tile, :, offset] += self._rows(live, receivers, len(samples), None)
 
     def _static_image(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> F32:
         """Direct light from a light before it moved, as exact as in the converged image; cached, since every frame uses
@@ -259,8 +252,7 @@ class _MovedLights:
 
     def _exact_rays(self, material: MaterialImage, light: Illumination) -> list[LocalRays]:
         """Rays of a light that has only local lights, as in converged images."""
-        images = self._images
-        _, points = images.transfer.incident_light(images.view, material.index, light, images.cache)
+        _, points = self._images.incident_light(material, light, lambda: False)
         return [rays for rays in points.rays if isinstance(rays, LocalRays)]
 
     def _add_moved(self, material: MaterialImage, live: LiveTerm, added: list[LightSource], out: F32) -> None:

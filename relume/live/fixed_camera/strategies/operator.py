@@ -2,8 +2,8 @@
 
 A step adds the most important coefficients first if time is short (eqs. 29 to 31, Ben-Artzi 2006). Along a parameter,
 whose few coefficients only approximate curves, a step sums all of them, and the image is nearly exact. A subsampled
-operator (`relume.operators.subsampled`) adds the change to an image of all samples. The results of subsampled and
-quantized operators (`relume.operators.quantized`) are shaded exactly when the drag ends.
+operator adds the change to an image of all samples. The results of compressed operators
+(`relume.operators.linear_operator`) are shaded exactly when the drag ends.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from relume.live.fixed_camera.displayed import MAX_EXACT_ROUNDING, DisplayedImag
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import Job
-from relume.live.fixed_camera.operator_budget import EXACT, MERGED_LIGHT, OperatorForm, operator_form, use_coarse
+from relume.live.fixed_camera.operator_budget import EXACT, MERGED_LIGHT, operator_form, use_coarse
 from relume.live.fixed_camera.strategies.operator_job import OperatorPrecompute, can_resume_from
 from relume.live.fixed_camera.strategies.resum import resum_job
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.linear_operator import MergedLightOperator
-from relume.operators.operator import Operator
+from relume.operators.linear_operator import Compression, LinearOperator
 
 F64 = NDArray[np.float64]
 
@@ -50,7 +49,7 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
 
 
 def advance(
-    ready: DisplayedImage, target_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
+    ready: DisplayedImage, target_bands: Mapping[str, F64], operator: LinearOperator, max_coefficients: int | None
 ) -> DisplayedImage:
     """Return an image after one step along its basis; the same if no free curve differs.
 
@@ -72,7 +71,7 @@ def advance(
 
 
 def _add_change(
-    ready: DisplayedImage, new_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
+    ready: DisplayedImage, new_bands: Mapping[str, F64], operator: LinearOperator, max_coefficients: int | None
 ) -> DisplayedImage:
     """Add T · Δc; resum if the rounding error is too large."""
     assert ready.basis is not None
@@ -102,7 +101,7 @@ def _add_change(
     return after.downgrade_if_inexact()
 
 
-def form_of(target: TermTarget, basis: EditBasis) -> OperatorForm | None:
+def form_of(target: TermTarget, basis: EditBasis) -> Compression | None:
     """Return the operator form that fits the memory budget; None: the term is shaded instead."""
     return operator_form(target.material, basis.num_columns, target.images.cache.budget_bytes)
 
@@ -145,7 +144,7 @@ def _continues(target: TermTarget, basis: EditBasis | None) -> bool:
     return changed <= set(active.affected_curves) or basis is None or not changed <= set(basis.affected_curves)
 
 
-def job_for(target: TermTarget, basis: EditBasis, form: OperatorForm) -> Job:
+def job_for(target: TermTarget, basis: EditBasis, form: Compression) -> Job:
     """Return an operator job; a coarse operator comes first if the exact one takes long and the edit can use it.
 
     Args:
@@ -184,7 +183,7 @@ def _exact_operator_job(situation: Situation) -> Job | None:
     for target in situation.targets:
         basis = target.live.ready.basis
         operator = target.images.operator(target.material, target.live)
-        if basis is not None and isinstance(operator, MergedLightOperator):
+        if basis is not None and operator is not None and operator.has_merged_lights:
             return OperatorPrecompute.for_target(target, basis, EXACT).job()
     return None
 

@@ -13,12 +13,11 @@ from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
-from relume.live.fixed_camera.operator_budget import OperatorForm, precompute_subsampled
+from relume.live.fixed_camera.operator_budget import compressed_bytes, precompute_subsampled
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.view_images import MERGED_LIGHT_SUFFIX, TermTarget
-from relume.operators.edit_basis import EditBasis
-from relume.operators.linear_operator import LinearOperator, MergedLightOperator
-from relume.operators.operator import Operator
-from relume.operators.quantized import QuantizedOperator
+from relume.operators.edit_basis import EditBasis, precompute
+from relume.operators.linear_operator import Compression, LinearOperator
 from relume.transport.shading_points import ShadingPoints
 
 F64 = NDArray[np.float64]
@@ -30,7 +29,7 @@ class OperatorPrecompute:
 
     Attributes:
         basis: the free coefficients. key: of the operator in the cache. bands: of the term's curves, (3, J) each.
-        light: the illumination. form: precision and sampling of the operator.
+        light: the illumination. form: compression of the operator.
     """
 
     target: TermTarget
@@ -39,17 +38,17 @@ class OperatorPrecompute:
     term: Term
     bands: Mapping[str, F64]
     light: Illumination
-    form: OperatorForm
+    form: Compression
 
     @classmethod
-    def for_target(cls, target: TermTarget, basis: EditBasis, form: OperatorForm) -> OperatorPrecompute:
+    def for_target(cls, target: TermTarget, basis: EditBasis, form: Compression) -> OperatorPrecompute:
         """Return the operator for the current target of a term.
 
         Args:
             target: the term. basis: its free coefficients. form: from `operator_form`.
         """
         images, material, live = target
-        key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.is_merged_light)
+        key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.has_merged_lights)
         return cls(target, basis, key, live.term, live.target_bands, live.light, form)
 
     def job(self) -> Job:
@@ -61,38 +60,34 @@ class OperatorPrecompute:
     @property
     def num_bytes(self) -> int:
         """Memory of the result."""
-        return self.form.num_bytes(self.target.material, self.basis.num_columns)
+        return compressed_bytes(self.target.material, self.basis.num_columns, self.form)
 
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Operator:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> LinearOperator:
         """Precompute the operator, or return it from the cache."""
         images, material, _ = self.target
+        step, bits, has_merged_lights = self.form
+        quality = LightQuality.MERGED if has_merged_lights else LightQuality.EXACT
 
-        def build_operator() -> Operator:
-            lights, receivers = images.incident_light(material, self.light, is_canceled)
+        def build_operator() -> LinearOperator:
+            lights, receivers = images.incident_light(material, self.light, is_canceled, quality)
 
-            def precompute_samples(subset: ShadingPoints) -> LinearOperator | QuantizedOperator:
-                callbacks = progress, is_canceled
-                return self.basis.precompute(
-                    self.term, self.bands, lights, subset, *callbacks, is_quantized=self.form.is_quantized
-                )
+            def precompute_at(samples: ShadingPoints) -> LinearOperator:
+                return precompute(self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits)
 
-            if self.form.is_merged_light:
-                lights = images.transfer.clustered_lights(self.light)
-                return MergedLightOperator(**vars(precompute_samples(receivers)))
-            if self.form.step == 1:
-                return precompute_samples(receivers)
-            return precompute_subsampled(images.view, material.index, self.form.step, receivers, precompute_samples)
+            if step > 1:
+                return precompute_subsampled(images.view, material.index, step, receivers, precompute_at)
+            return replace(precompute_at(receivers), has_merged_lights=has_merged_lights)
 
-        return images.cache.get(self.key, Operator, self.num_bytes, build_operator)  # type: ignore[type-abstract]
+        return images.cache.get(self.key, LinearOperator, self.num_bytes, build_operator)
 
-    def apply(self, result: Operator) -> None:
+    def apply(self, result: LinearOperator) -> None:
         """Use the operator, only if its fixed curves are still those of the target.
 
         If the image shows other curves, or the operator is more exact, the image is summed anew. An operator that is
         not exact continues from the current image, if that differs in nothing else.
         """
         images, material, live = self.target
-        is_merged_light = self.form.is_merged_light
+        is_merged_light = self.form.has_merged_lights
         if not is_merged_light:
             images.cache.evict((*self.key, MERGED_LIGHT_SUFFIX))
         current_key = images.operator_key(

@@ -22,7 +22,7 @@ from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, direct_only
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
-from relume.live.fixed_camera.protocols import FixedViewTransfer, SampledShading
+from relume.live.fixed_camera.protocols import FixedViewTransfer, LightQuality, Samples
 from relume.live.fixed_camera.strategies import incremental_light
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages
@@ -50,7 +50,7 @@ class SampleSubset:
         samples: the shaded samples. weights: sparse float32, rows sum to 1. (samples, shaded samples)
     """
 
-    samples: SampledShading
+    samples: Samples
     weights: Any
 
     @property
@@ -77,7 +77,8 @@ def choose_samples(
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(sample_indices))
     weights = csr_array((weight.ravel(), neighbors.ravel(), first), shape=shape)
     weights.eliminate_zeros()
-    return SampleSubset(transfer.subset(view, material, sample_indices, has_indirect=has_indirect), weights)
+    samples = transfer.selected_samples(view, material, sample_indices, has_indirect=has_indirect)
+    return SampleSubset(samples, weights)
 
 
 def _num_shaded(detail: int) -> int:
@@ -195,7 +196,8 @@ class SparsePreview:
 
     def _preview_image(self, snapshot: _TermSnapshot, subset: SampleSubset, is_canceled: CancelCheck) -> F32:
         """Return one term's image, (tiles, 3, samples) float32; BTFs evaluate a texel per sample if that is fast."""
-        incident, btf_ref = subset.samples.incident_light(self.light), snapshot.term.texels
+        transfer, btf_ref = self.images.transfer, snapshot.term.texels
+        incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
             return _interpolate(
                 shade(snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled), subset.weights
