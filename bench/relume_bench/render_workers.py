@@ -59,11 +59,11 @@ def _batch_s(service: BakeService, bake: str, view: str, frames: int) -> float:
     process = ProcessSettings(str(service.data_dir), 1 << 29, (), 1 << 30, 60)
     with closing(ClusterSteps(service.executors, process, {})) as steps:
         ledger = JobLedger(service.ledger.sessions, Quota(99, 99), new_owner())
-        jobs = JobService(ledger, steps.run, steps.num_places, str, {})
+        jobs = JobService(ledger, steps.run, steps.num_slots, str, {})
         renders = RenderJobs(jobs, service.data_dir, lambda bake: "bench", lambda job, num_bytes: None)
         with closing(jobs):
             jobs.start()
-            _render_s(renders, bake, view, [350.0 + k for k in range(2 * steps.num_places())])
+            _render_s(renders, bake, view, [350.0 + k for k in range(2 * steps.num_slots())])
             return _render_s(renders, bake, view, [5.0 * k for k in range(frames)])
 
 

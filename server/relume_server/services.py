@@ -205,7 +205,7 @@ def _open_jobs(settings: Settings, service: BakeService, executor: StepExecutor)
     def error_text(error: Exception) -> str:
         return make_problem(error).detail
 
-    return JobService(ledger, executor.run, executor.num_places, error_text, settings.fair_shares)
+    return JobService(ledger, executor.run, executor.num_slots, error_text, settings.fair_shares)
 
 
 class _Kinds(NamedTuple):

@@ -52,7 +52,7 @@ def tiny_scene(name: str = "triangle") -> Scene:
 
 
 def write_tiny_scene(request: ImportRequest) -> str:
-    """In place of an import process: write the tiny scene, whatever the file is."""
+    """In slot of an import process: write the tiny scene, whatever the file is."""
     return _write_scene(request, tiny_scene())
 
 
@@ -363,7 +363,7 @@ class InThreadSteps:
     def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         return do_step(self._context, step, report, lambda: not is_needed())
 
-    def num_places(self) -> int:
+    def num_slots(self) -> int:
         return 1
 
     def close(self) -> None:

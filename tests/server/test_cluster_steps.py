@@ -28,7 +28,7 @@ class Workers:
 
     def __init__(self, *outcomes: Outcome) -> None:
         self._outcomes = list(outcomes)
-        self.places: list[str] = []
+        self.slots: list[str] = []
         self.num_users = 0
 
     @contextmanager
@@ -40,9 +40,9 @@ class Workers:
     def num_processes(self) -> int:
         return 1
 
-    def cluster(self, place: str) -> Any:
+    def cluster(self, slot: str) -> Any:
         assert self.num_users > 0
-        self.places.append(place)
+        self.slots.append(slot)
         return SimpleNamespace(submit=self._submit)
 
     def _submit(self, fn: object, process: object, step: Step, progress_file: str) -> Future[Any]:
@@ -86,7 +86,7 @@ def test_urgent_steps_take_urgent_places_and_claims_are_removed(tmp_path: Path) 
     steps, workers = steps_with(tmp_path, checks_claim, checks_claim)
     for is_first in (True, False):
         assert steps.run(Step("work", is_first), ignore, lambda: True) == {"kind": "work"}
-    assert workers.places == [URGENT, BULK]
+    assert workers.slots == [URGENT, BULK]
     assert list((tmp_path / "steps").iterdir()) == []
 
 

@@ -1,4 +1,4 @@
-"""Jobs: claimed, shared fairly among clients, spread over places, taken over, stopped."""
+"""Jobs: claimed, shared fairly among clients, spread over slots, taken over, stopped."""
 
 import threading
 import time
@@ -14,8 +14,8 @@ from sqlalchemy import select, update
 from relume.core.errors import CancelledError, RelumeError
 from relume_worker.database import open_database
 from relume_worker.database.models import JobRow
-from relume_worker.jobs.fair_places import FairPlaces
 from relume_worker.jobs.fair_share import FairShare, Waiting
+from relume_worker.jobs.fair_slots import FairSlots
 from relume_worker.jobs.job import BusyError, Quota, QuotaError
 from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_ledger import JobLedger
@@ -72,12 +72,12 @@ def test_weights_set_the_number_of_turns() -> None:
 
 
 def test_places_limit_concurrent_steps_and_waiting_ends_when_not_needed() -> None:
-    places, num_running, peak = FairPlaces(lambda: 2, {}), 0, 0
+    slots, num_running, peak = FairSlots(lambda: 2, {}), 0, 0
     lock = threading.Lock()
 
     def work(client: str) -> None:
         nonlocal num_running, peak
-        with places.take(Step("work", client=client), lambda: True):
+        with slots.take(Step("work", client=client), lambda: True):
             with lock:
                 num_running += 1
                 peak = max(peak, num_running)
@@ -92,10 +92,10 @@ def test_places_limit_concurrent_steps_and_waiting_ends_when_not_needed() -> Non
         thread.join()
     assert peak == 2
     with (
-        places.take(Step("work"), lambda: True),
-        places.take(Step("work"), lambda: True),
+        slots.take(Step("work"), lambda: True),
+        slots.take(Step("work"), lambda: True),
         pytest.raises(CancelledError, match="before it started"),
-        places.take(Step("work"), lambda: False),
+        slots.take(Step("work"), lambda: False),
     ):
         pass
 
@@ -127,10 +127,10 @@ class FrameJobs(JobKind[Frames]):
 
 
 class Machine:
-    """Runs steps in their threads, in fair places, and records them."""
+    """Runs steps in their threads, in fair slots, and records them."""
 
-    def __init__(self, num_places: int = 1) -> None:
-        self.places = FairPlaces(lambda: num_places, {})
+    def __init__(self, num_slots: int = 1) -> None:
+        self.slots = FairSlots(lambda: num_slots, {})
         self.done: list[str] = []
         self.running: set[str] = set()
         self.peak = 0
@@ -138,7 +138,7 @@ class Machine:
 
     def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         path = step.values["path"]
-        with self.places.take(step, is_needed):
+        with self.slots.take(step, is_needed):
             assert path not in self.running, "two do the same"
             self.running.add(path)
             self.peak = max(self.peak, len(self.running))
@@ -155,9 +155,9 @@ class Machine:
 class Jobs:
     """One service with its kind of jobs."""
 
-    def __init__(self, ledger: Ledger, folder: Path, machine: Machine, num_places: int = 1, quota: int = 99) -> None:
+    def __init__(self, ledger: Ledger, folder: Path, machine: Machine, num_slots: int = 1, quota: int = 99) -> None:
         rows = JobLedger(ledger.sessions, Quota(quota, quota - 1), new_owner())
-        self.service = JobService(rows, machine.run, lambda: num_places, str, {})
+        self.service = JobService(rows, machine.run, lambda: num_slots, str, {})
         self.frames = FrameJobs(self.service, folder)
 
     def submit(self, name: str, client: str = "", num: int = 2) -> str:
@@ -185,7 +185,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path, 
     may_begin = threading.Event()
     machine.before = lambda path, is_needed: wait_for(may_begin.is_set)
     jobs.service.start()
-    wait_for(lambda: len(machine.places._waiting) == 2)  # one has the place
+    wait_for(lambda: len(machine.slots._waiting) == 2)  # one has the slot
     may_begin.set()
     jobs.wait(last)
     wait_for(lambda: not jobs.service._runs)
@@ -194,9 +194,9 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path, 
     assert machine.done[:7].count("b") >= 3, "bob has half of the turns while he waits"
 
 
-def test_frames_of_one_job_take_all_places(tmp_path: Path, ledger: Ledger) -> None:
+def test_frames_of_one_job_take_all_slots(tmp_path: Path, ledger: Ledger) -> None:
     machine = Machine(3)
-    jobs = Jobs(ledger, tmp_path, machine, num_places=3)
+    jobs = Jobs(ledger, tmp_path, machine, num_slots=3)
     jobs.service.start()
     jobs.wait(jobs.submit("a", num=12))
     jobs.service.close()
@@ -223,7 +223,7 @@ def test_two_services_repeat_no_step_and_resume_abandoned_jobs(tmp_path: Path, l
 
 def test_failed_step_fails_the_job_and_the_rest_resumes(tmp_path: Path, ledger: Ledger) -> None:
     machine = Machine(2)
-    jobs = Jobs(ledger, tmp_path, machine, num_places=2)
+    jobs = Jobs(ledger, tmp_path, machine, num_slots=2)
 
     def fail(path: str, is_needed: IsNeeded) -> None:
         if path.endswith("/1"):
@@ -245,7 +245,7 @@ def test_failed_step_fails_the_job_and_the_rest_resumes(tmp_path: Path, ledger: 
 @pytest.mark.parametrize("end", ["stop", "delete", "close"])
 def test_job_ends_at_once_when_it_is_not_wanted(tmp_path: Path, ledger: Ledger, end: str) -> None:
     machine, has_begun = Machine(2), threading.Event()
-    jobs = Jobs(ledger, tmp_path, machine, num_places=2)
+    jobs = Jobs(ledger, tmp_path, machine, num_slots=2)
 
     def hang(path: str, is_needed: IsNeeded) -> None:
         has_begun.set()

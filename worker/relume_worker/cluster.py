@@ -16,8 +16,8 @@ from relume.core.errors import ParameterError, PlanError
 from relume_worker.executor import (
     DASK_CONFIG,
     SINGLE_THREAD_ENV,
-    WORKER_PLACES,
     WORKER_PRELOAD,
+    WORKER_SLOTS,
     check_certificates,
     num_cores,
 )
@@ -68,8 +68,8 @@ async def _join(scheduler: str, num_processes: int) -> int:
 def _nanny(scheduler: str) -> Nanny:
     return Nanny(
         scheduler,
-        nthreads=len(WORKER_PLACES),
-        resources=WORKER_PLACES,
+        nthreads=len(WORKER_SLOTS),
+        resources=WORKER_SLOTS,
         dashboard=False,
         local_directory=tempfile.gettempdir(),
         death_timeout=JOIN_S,

@@ -34,13 +34,13 @@ def _attempt(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
 class DaskExecutor(Executor):
     """Tasks of one Dask client; each runs even if an identical one has run before."""
 
-    def __init__(self, client: Any, place: str) -> None:
+    def __init__(self, client: Any, slot: str) -> None:
         """
         Args:
             client: a connected `distributed.Client`, which its creator closes.
-            place: Dask resource of which each task takes one.
+            slot: Dask resource of which each task takes one.
         """
-        self._client, self._place = client, place
+        self._client, self._place = client, slot
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Submit a call. Its future raises KilledWorker if the worker died, CancelledError if the cluster is gone."""

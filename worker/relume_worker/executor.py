@@ -4,7 +4,7 @@ A cluster takes seconds to start (spawn, imports, compiled kernels); a preview b
 `TINY_BAKE_S`, or of `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES`, runs in this process, one task at a time on the kernels'
 own threads, and the cluster starts with the first larger one. Its processes yield to interactive work.
 
-Each worker process has two places, which are Dask resources: one for bulk work (tasks of bakes, frames of animations),
+Each worker process has two slots, which are Dask resources: one for bulk work (tasks of bakes, frames of animations),
 on one core; one for work that a person waits for (stills, thumbnails), on all cores. So nobody waits for the end of a
 stranger's task.
 """
@@ -41,10 +41,10 @@ CONNECT_S = 10
 BAKE_NICE = 10
 WORKER_PRELOAD = ["relume_worker.executor"]  # Dask's name for modules whose `dask_setup` runs in each process
 
-# Places of a process, and their number; see above. `relume worker` offers them, and so must workers that others start.
+# Slots of a process, and their number; see above. `relume worker` offers them, and so must workers that others start.
 BULK, URGENT = "bulk", "urgent"
-WORKER_PLACES = {BULK: 1, URGENT: 1}
-# One Python thread per place, so one thread for every library below it.
+WORKER_SLOTS = {BULK: 1, URGENT: 1}
+# One Python thread per slot, so one thread for every library below it.
 SINGLE_THREAD_ENV = dict.fromkeys(
     ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
@@ -115,11 +115,11 @@ class Executors:
             with self._lock:
                 self._num_users, self._last_used_s = self._num_users - 1, time.monotonic()
 
-    def cluster(self, place: str = BULK) -> Executor:
+    def cluster(self, slot: str = BULK) -> Executor:
         """The Dask cluster. Raises PlanError if the scheduler does not answer, or its workers are not relume's.
 
         Args:
-            place: `BULK` or `URGENT`.
+            slot: `BULK` or `URGENT`.
         """
         with self._lock:
             if self._client is not None and self._client.status != "running":  # the scheduler is gone
@@ -128,7 +128,7 @@ class Executors:
                 self._client = None
             if self._client is None:
                 self._client = self._connect()
-            return DaskExecutor(self._client, place)
+            return DaskExecutor(self._client, slot)
 
     @property
     def has_cluster(self) -> bool:
@@ -186,7 +186,7 @@ class Executors:
                     f"the scheduler {address} does not answer ({error}); start it, then try again"
                 ) from None
             if self.scheduler:
-                _check_places(client)
+                _check_slots(client)
             return client
 
     def _start_cluster(self) -> Any:
@@ -203,8 +203,8 @@ class Executors:
         with _without_interrupts(), dask.config.set(NO_HTTP_ROUTES):
             self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=self.num_workers,
-                threads_per_worker=len(WORKER_PLACES),
-                resources=WORKER_PLACES,
+                threads_per_worker=len(WORKER_SLOTS),
+                resources=WORKER_SLOTS,
                 processes=True,
                 host="127.0.0.1",
                 security=Security.temporary(),  # type: ignore[no-untyped-call]
@@ -229,13 +229,13 @@ def check_certificates(scheduler: str | None) -> None:
         )
 
 
-def _check_places(client: Any) -> None:
-    """Raise PlanError if the cluster's workers offer no places: their tasks would wait for ever."""
+def _check_slots(client: Any) -> None:
+    """Raise PlanError if the cluster's workers offer no slots: their tasks would wait for ever."""
     workers = client.scheduler_info(n_workers=-1)["workers"].values()
     if workers and not any(BULK in worker["resources"] for worker in workers):
         client.close()
         raise PlanError(
-            "the workers of the scheduler have no places for relume's tasks; start them with `relume worker`, or with "
+            "the workers of the scheduler have no slots for relume's tasks; start them with `relume worker`, or with "
             f"--nthreads 2 --resources '{BULK}=1 {URGENT}=1'"
         )
 

@@ -22,7 +22,7 @@ from relume.core.errors import CancelledError, DiskFullError, NotFoundError, Rel
 from relume_server.batch.worker_process import ProcessSettings, run_step
 from relume_worker.executor import BULK, URGENT, Executors
 from relume_worker.jobs.claim import claim
-from relume_worker.jobs.fair_places import FairPlaces
+from relume_worker.jobs.fair_slots import FairSlots
 from relume_worker.jobs.step import IsNeeded, ProgressCallback, Step
 from relume_worker.runner import SCHEDULER_LOST_MESSAGE, is_lost_process
 
@@ -55,10 +55,10 @@ class ClusterSteps:
 
     def __init__(self, executors: Executors, process: ProcessSettings, weights: Mapping[str, float]) -> None:
         self._executors, self._process = executors, process
-        self._places = FairPlaces(executors.num_processes, weights)
+        self._slots = FairSlots(executors.num_processes, weights)
         self._closing = threading.Event()
 
-    def num_places(self) -> int:
+    def num_slots(self) -> int:
         """Number of bulk steps that run at once."""
         return self._executors.num_processes()
 
@@ -68,8 +68,8 @@ class ClusterSteps:
         def is_wanted() -> bool:
             return not self._closing.is_set() and is_needed()
 
-        place: AbstractContextManager[None] = nullcontext() if step.is_first else self._places.take(step, is_wanted)
-        with self._executors.keep_cluster(), place:
+        slot: AbstractContextManager[None] = nullcontext() if step.is_first else self._slots.take(step, is_wanted)
+        with self._executors.keep_cluster(), slot:
             if step.claim is not None:
                 return self._run_claimed(step, step.claim, report, is_wanted)
             folder = Path(self._process.data) / "steps" / uuid.uuid4().hex

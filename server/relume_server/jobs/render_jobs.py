@@ -22,7 +22,7 @@ LAYER_FOLDERS = ".layers-*"
 
 
 class RenderJobs(JobKind[RenderRequest]):
-    """Batches of images in `data`/renders/<id>/; a step is one image, and as many run at once as there are places."""
+    """Batches of images in `data`/renders/<id>/; a step is one image, and as many run at once as there are slots."""
 
     name, placeholder = "render", RENDER_PLACEHOLDER
 

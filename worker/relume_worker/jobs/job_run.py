@@ -26,7 +26,7 @@ class StepHost(Protocol):
     def run_step(self) -> RunStep: ...
     @property
     def is_closing(self) -> bool: ...
-    def num_places(self) -> int:
+    def num_slots(self) -> int:
         """Number of bulk steps that run at once."""
         ...
 
@@ -94,14 +94,14 @@ class JobRun(Generic[Request]):
         return answer
 
     def timed_steps(self, kind: str, values: Mapping[int, Mapping[str, Any]], done: int) -> None:
-        """Run several steps that the job counts, as many at once as there are places for them.
+        """Run several steps that the job counts, as many at once as there are slots for them.
 
         Args:
             kind: kind of the steps. values: their arguments, by index. done: number of steps that are finished already.
         Raises:
             The error of the first step that fails; the others are canceled.
         """
-        with ThreadPoolExecutor(max(1, min(len(values), self._host.num_places())), "relume-steps") as threads:
+        with ThreadPoolExecutor(max(1, min(len(values), self._host.num_slots())), "relume-steps") as threads:
             futures = [threads.submit(self.timed_step, index, kind, each) for index, each in values.items()]
             try:
                 for num, future in enumerate(as_completed(futures), 1):

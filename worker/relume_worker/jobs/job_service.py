@@ -40,7 +40,7 @@ class JobService:
     """Runs jobs; several services may share a database and a data directory.
 
     Args:
-        ledger: of the jobs. run_step: runs a step in another process. num_places: bulk steps that run at once.
+        ledger: of the jobs. run_step: runs a step in another process. num_slots: bulk steps that run at once.
         error_text: one sentence about an exception, for the job's row.
         weights: of clients, see `FairShare`.
     """
@@ -49,11 +49,11 @@ class JobService:
         self,
         ledger: JobLedger,
         run_step: RunStep,
-        num_places: Callable[[], int],
+        num_slots: Callable[[], int],
         error_text: Callable[[Exception], str],
         weights: dict[str, float],
     ) -> None:
-        self.ledger, self.run_step, self.num_places, self._error_text = ledger, run_step, num_places, error_text
+        self.ledger, self.run_step, self.num_slots, self._error_text = ledger, run_step, num_slots, error_text
         self._kinds: dict[str, JobKind[Any]] = {}
         self._fair_share = FairShare(weights)
         self._wake, self._closing, self._ended = threading.Event(), threading.Event(), threading.Event()

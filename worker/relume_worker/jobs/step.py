@@ -16,7 +16,7 @@ class Step:
 
     Attributes:
         kind: key of `relume_server.batch.step_registry.STEPS`.
-        is_first: somebody waits for it: it takes an urgent place, and does not wait for its client's turn.
+        is_first: somebody waits for it: it takes an urgent slot, and does not wait for its client's turn.
         values: arguments of the step; JSON.
         claim: folder and lease owner of its job, see `relume_worker.jobs.claim`; None: no job.
         client: who submitted the job; bulk work is shared fairly among clients.
@@ -51,7 +51,7 @@ class StepExecutor(Protocol):
 
     @property
     def run(self) -> RunStep: ...
-    def num_places(self) -> int:
+    def num_slots(self) -> int:
         """Number of bulk steps that run at once."""
         ...
 

@@ -1,4 +1,4 @@
-"""Places for bulk steps, given to clients in turn."""
+"""Slots for bulk steps, given to clients in turn."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from relume_worker.jobs.step import IsNeeded, Step
 _POLL_S = 0.1
 
 
-class FairPlaces:
+class FairSlots:
     """Limits the steps that run at once, and chooses the next by clients' shares.
 
     Args:
-        num_places: current limit. weights: of clients, see `FairShare`.
+        num_slots: current limit. weights: of clients, see `FairShare`.
     """
 
-    def __init__(self, num_places: Callable[[], int], weights: Mapping[str, float]) -> None:
-        self._num_places, self._fair_share = num_places, FairShare(weights)
+    def __init__(self, num_slots: Callable[[], int], weights: Mapping[str, float]) -> None:
+        self._num_slots, self._fair_share = num_slots, FairShare(weights)
         self._changed = threading.Condition()
         self._tickets = itertools.count()
         self._waiting: list[Waiting] = []
@@ -30,14 +30,14 @@ class FairPlaces:
 
     @contextmanager
     def take(self, step: Step, is_needed: IsNeeded) -> Iterator[None]:
-        """Wait for a place, and hold it in the block. Raises CancelledError if the step is no longer needed."""
+        """Wait for a slot, and hold it in the block. Raises CancelledError if the step is no longer needed."""
         ticket = next(self._tickets)
         waiting = Waiting(str(ticket), step.client, step.is_first, ticket)
-        num_places = self._num_places()  # asked outside the lock: it may ask the cluster
+        num_slots = self._num_slots()  # asked outside the lock: it may ask the cluster
         with self._changed:
             self._waiting.append(waiting)
             try:
-                while self._num_running >= num_places or self._fair_share.sort(self._waiting)[0] is not waiting:
+                while self._num_running >= num_slots or self._fair_share.sort(self._waiting)[0] is not waiting:
                     if not is_needed():
                         raise CancelledError(f"the {step.kind} was stopped before it started")
                     self._changed.wait(_POLL_S)
