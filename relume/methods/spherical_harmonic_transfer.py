@@ -31,15 +31,15 @@ def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]
     light_samples = read_shadow_ray_directions(store), read_tiles(store).solid_angles
     probes, visible = read_probes(store), store.read("probes/visibility")
     patch_points, (num_patches, points_per_patch, _) = read_patch_points(store), store.shape("patches/normal")
-    bits = store.read("patches/visibility")  # shapes are stated, because a scene may have no patches
-    patch_visible = bits.reshape(num_patches, points_per_patch, bits.shape[-1])
+    num_bytes = (len(light_samples[0]) + 7) // 8  # stated, because a scene may have no patches
+    patch_visible = store.read("patches/visibility").reshape(num_patches, points_per_patch, num_bytes)
 
     def matrices(rows: NDArray[np.intp]) -> F32:
         return transfer_matrices(probes.rows(rows), visible[rows], *light_samples, FAST_DEGREE)
 
     clustered = ClusteredTransfer.fit(probes.num_points, matrices, np.random.default_rng(seed))
     point_transfer = transfer_matrices(
-        patch_points, bits.reshape(patch_points.num_points, bits.shape[-1]), *light_samples, 0
+        patch_points, patch_visible.reshape(patch_points.num_points, num_bytes), *light_samples, 0
     )
     irradiance = np.sqrt(np.pi) * point_transfer.reshape(num_patches, points_per_patch, NUM_HARMONICS).mean(axis=1)
     first_points = patch_points.rows(np.arange(num_patches) * points_per_patch)
