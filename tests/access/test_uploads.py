@@ -258,7 +258,7 @@ class TestSlots:
         return "".join(got)
 
     def test_slots_alternate_between_users(self) -> None:
-        assert self.order_of(Slots(1, 1, {}), "aaaabb") == "aababa"
+        assert self.order_of(Slots(1, 1, {}), "aaaabb") == "ababaa"
 
     def test_one_user_cannot_take_every_slot(self) -> None:
         assert self.order_of(Slots(2, 1, {}), "aab") == "aba"

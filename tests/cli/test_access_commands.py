@@ -58,7 +58,7 @@ def test_tokens_are_printed_as_json(tmp_path: Path, capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["add", "Ann", "--role", "boss"], "relume: --role is 'boss'; give view, edit, admin\n"),
+        (["add", "Ann", "--role", "boss"], "relume: --role is 'boss'; give one of view, edit, admin\n"),
         (["add", " Ann"], "relume: name is ' Ann'; give 1 to 80 printable characters\n"),
         (["revoke", "Eve"], "relume: there is no valid token 'Eve'; relume token list shows them\n"),
     ],

@@ -34,7 +34,7 @@ def test_finished_bake_is_deleted_only_if_requested(client: TestClient, baked: B
     url = f"/api/bakes/{baked.bake}"
     refused = client.delete(url)
     assert refused.status_code == 409
-    assert parse_problem(refused)["detail"].endswith("(?delete_files=true deletes it)")
+    assert parse_problem(refused)["detail"].endswith("; ?delete_files=true deletes it")
     assert client.get(url).json()["state"] == "ready"
     assert client.delete(f"{url}?delete_files=true").status_code == 204
     assert client.get(url).status_code == 404

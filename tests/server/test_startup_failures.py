@@ -20,7 +20,7 @@ def test_opened_services_are_closed_if_startup_fails(tmp_path):
         service.close = lambda: closed.append(close())
         return service
 
-    def no_batches(settings, library):
+    def no_batches(settings, library, bakes):
         raise OSError("there is no room for processes")
 
     control = Control()

@@ -48,7 +48,8 @@ class JobRun(Generic[Request]):
         """
         self._host, self._kind, self._is_first = host, kind, is_first
         self.job, self.folder, self.timer = job, folder, StepTimer(step_s)
-        self._needed_until_s, self._has_failed = 0.0, False
+        self._needed_until_s = 0.0
+        self._error: BaseException | None = None  # of the first step that failed
 
     def record(self, done: int) -> None:
         """Record the number of finished steps; the last one is recorded when the run ends.
@@ -62,7 +63,7 @@ class JobRun(Generic[Request]):
 
     def is_needed(self) -> bool:
         """True unless the job was stopped, deleted or taken over a moment ago, or the service is closing."""
-        if self._host.is_closing or self._has_failed:
+        if self._host.is_closing or self._error is not None:
             return False
         if time.monotonic() < self._needed_until_s:
             return True  # steps ask thousands of times per second
@@ -88,8 +89,14 @@ class JobRun(Generic[Request]):
         Args:
             index: index of the step. kind: kind of the step. values: its arguments.
         """
+        if self._error is not None:
+            raise CancelledError(f"an earlier step of the {noun(self._kind)} has failed")
         self.timer.start()
-        answer = self.step(kind, values, lambda fraction: self.timer.report(index, fraction))
+        try:
+            answer = self.step(kind, values, lambda fraction: self.timer.report(index, fraction))
+        except BaseException as error:
+            self._error = self._error or error
+            raise
         self.timer.finish(index)
         return answer
 
@@ -107,9 +114,8 @@ class JobRun(Generic[Request]):
                 for num, future in enumerate(as_completed(futures), 1):
                     future.result()
                     self.record(done + num)
-            except BaseException:
-                self._has_failed = True
-                raise
+            except CancelledError:  # of a step that ended because another had failed, perhaps
+                raise self._error or CancelledError(f"the {noun(self._kind)} was stopped") from None
             finally:
                 for future in futures:
                     future.cancel()
