@@ -1,6 +1,7 @@
 """A scene, and an opened bake of it for each registered method."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -69,13 +70,27 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     metafunc.parametrize("method", marked, indirect=True, scope="session")
 
 
-@pytest.fixture(scope="session")
-def method(request: pytest.FixtureRequest) -> Iterator[BakeMethod]:
-    """A method; the tests' own is registered with the same lines as the others."""
+@contextmanager
+def _furnace_registered() -> Iterator[None]:
+    """Register the tests' own method with the same lines as the others; tests outside this folder must not meet it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(METHODS, FurnaceMethod.name, FurnaceMethod())
         patch.setitem(OPENERS, FurnaceMethod.name, FurnaceViews.from_store)
-        yield METHODS[request.param]
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def furnace_registered() -> Iterator[None]:
+    """The tests' own method is registered for the modules of this folder."""
+    with _furnace_registered():
+        yield
+
+
+@pytest.fixture(scope="session")
+def method(request: pytest.FixtureRequest) -> BakeMethod:
+    """A method, or the tests' own."""
+    with _furnace_registered():
+        return METHODS[request.param]
 
 
 @pytest.fixture(scope="session")
@@ -103,7 +118,8 @@ def baked(watched: Bake) -> Path:
 @pytest.fixture(scope="session")
 def opened(baked: Path) -> OpenBake:
     """The bake, opened."""
-    return open_bake(baked, Cache(1 << 30))
+    with _furnace_registered():
+        return open_bake(baked, Cache(1 << 30))
 
 
 @pytest.fixture(scope="session")

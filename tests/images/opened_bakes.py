@@ -11,10 +11,10 @@ from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 
 
-def open_small_bake(scene, method, folder):
+def open_small_bake(scene, method, folder, **options):
     """A bake of 24×18 pixels under 60 lights."""
     folder.mkdir(exist_ok=True)
-    recipe = Recipe(method, ("front",), (24, 18), 60, num_probes=300 if method == "probes" else None)
+    recipe = Recipe(method, ("front",), (24, 18), 60, num_probes=300 if method == "probes" else None, **options)
     return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / "store.zarr"), Cache(1 << 30))
 
 

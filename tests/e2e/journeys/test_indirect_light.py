@@ -59,16 +59,16 @@ def test_indirect_light_is_baked_from_the_dialog_and_shown_by_paths(start_page: 
     paths.get_by_role("radio", name="1 bounce").press("ArrowLeft")
     assert changed(everything, editor.pixels()) > 0.5
     paths.get_by_role("radio", name="Indirect").press("ArrowLeft")
-    expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
+    expect(paths.get_by_role("radio", name="Direct", exact=True)).to_be_checked()
     direct_alone = editor.pixels()
     assert direct_alone.mean() < everything.mean()
     expect(steps).to_have_count(2)  # a way of looking, no edit
     page.reload()
     assert changed(direct_alone, editor.pixels()) == 0
-    expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
+    expect(paths.get_by_role("radio", name="Direct", exact=True)).to_be_checked()
     expect(steps).to_have_count(2)
     page.keyboard.press("Control+z")
-    expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
+    expect(paths.get_by_role("radio", name="Direct", exact=True)).to_be_checked()
     page.keyboard.press("Control+Shift+z")
     page.get_by_role("button", name="Direct light only").click()
     assert changed(everything, editor.pixels()) == 0

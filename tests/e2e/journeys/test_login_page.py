@@ -96,7 +96,7 @@ def test_who_may_only_look_chooses_light_paths_and_hears_no_objection(
         viewer = Editor(page)
         viewer.wait_until_exact()
         before = viewer.pixels()
-        page.get_by_role("radiogroup", name="Light paths").get_by_role("radio", name="Direct").click()
+        page.get_by_role("radiogroup", name="Light paths").get_by_role("radio", name="Direct", exact=True).click()
         viewer.wait_until_exact()
         assert changed(viewer.pixels(), before) > 0.01
         page.get_by_role("slider", name="Bounces").press("ArrowLeft")

@@ -5,19 +5,21 @@ from __future__ import annotations
 import numpy as np
 import numpy_reference as ref
 import pytest
-from exact_pictures import exact_image
+from exact_pictures import exact_image, render_uncached
 from session_edits import BUDGET, bake_corner_scene, kind_of, make_look, relative_rmse, run_next_job, run_until_exact
 from tiny_scenes import corner
 
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.openers import open_transfer
 from relume.methods.registry import METHODS
 from relume.reference import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
+from relume.transport.outgoing_patch_light import isotropic
 from relume.views.view import open_view
 
 FLOOR = "/materials/Floor/terms/1/"
@@ -177,18 +179,26 @@ def test_a_rotation_is_previewed_and_then_exact(direct) -> None:
 
 
 @pytest.mark.slow
-def test_a_moved_light_is_followed(gather) -> None:
-    picture = shown(gather, changed(gather, light=[0.3, 0.9, 0.3]))
+def test_a_moved_light_is_followed(gather, monkeypatch) -> None:
+    before, after = (changed(gather, light=position) for position in ([0.3, 0.9, 0.3], [0.0, 0.9, 0.5]))
+    picture = shown(gather, before)
     picture.prepare("/lights/lamp")
     made = []
     while picture.next_job() is not None:
         made.append(run_next_job(picture))
     assert any(kind_of(job) == "rows" for job in made)
-    look = changed(gather, light=[0.0, 0.9, 0.5])
-    picture.set_look(look, active_pointer="/lights/lamp")
+    picture.set_look(after, active_pointer="/lights/lamp")
     assert not picture.advance(8).exact
-    exact = exact_image(gather, look)
-    assert relative_rmse(picture.image(), exact) < 0.05  # 0.025 without the map, whose smooth texels are sharper
+    followed, exact = picture.image(), exact_image(gather, after)
+    # During a drag, patches have the same radiance in all directions, also those with the highlight that smooth texels
+    # of the floor reflect. Over eight seeds the error is 0.032 to 0.086, without the map 0.022 to 0.042; the median is
+    # 0.002 to 0.004. The image before the move differs by 0.44.
+    assert relative_rmse(followed, exact) < 0.1
+    assert np.median(np.abs(followed - exact) / exact) < 0.005
+    with monkeypatch.context() as patch:  # the error of everything else, over the same seeds: 0.015 to 0.021
+        patch.setattr(IndirectSolver, "exact", lambda solver, light: isotropic(solver.preview(light)))
+        change = render_uncached(gather, after) - render_uncached(gather, before)
+    assert relative_rmse(followed, exact_image(gather, before) + change) < 0.025
     assert relative_rmse(run_until_exact(picture).image(), exact) < 1e-4
 
 

@@ -4,7 +4,7 @@ import { freeCameraOf } from "../../viewport/cameras/freeCamera";
 import type { CameraPose } from "../../viewport/cameras/orbit";
 import { commitPreview, cancelPreview, previewedStep, previewStep } from "../../edit/edit";
 import { interpolateLooks } from "../../session/net/api";
-import type { Look, LooksBody, RenderRequest } from "../../protocol";
+import type { Look, LooksBody, LooksRequest, RenderRequest } from "../../protocol";
 import { bake } from "../../state/bakes";
 import { timelineOpen } from "../../state/panels";
 import { activeViewName } from "../../state/views";
@@ -127,9 +127,9 @@ effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
   const body = {
     frames: Math.max(numFrames.value, looks.length),
-    between: interpolation.value,
+    interpolation: interpolation.value,
     view: activeViewName.value,
-  };
+  } satisfies Partial<LooksRequest>;
   const motion = currentPath.value;
   const requestNumber = ++newestRequest;
   frameLookList.value = null;
