@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
@@ -130,8 +131,13 @@ class JobLedger:
         columns = JobRow.id, JobRow.client, JobRow.is_first, JobRow.created, JobRow.owner, JobRow.heartbeat
         query = select(*columns, epoch_s().label("now")).where(JobRow.state.in_(ACTIVE))  # requests may be large
         with self._sessions() as session:
-            rows = [row for row in session.execute(query) if row.id not in running and not self._is_leased(row)]
-        return [Waiting(row.id, row.client or "", bool(row.is_first), row.created) for row in rows]
+            rows = [(row, self._is_leased(row)) for row in session.execute(query)]
+        num_elsewhere = Counter(row.client or "" for row, is_leased in rows if is_leased)
+        return [
+            Waiting(row.id, client := row.client or "", bool(row.is_first), row.created, num_elsewhere[client])
+            for row, is_leased in rows
+            if not is_leased and row.id not in running
+        ]
 
     def claim(self, identity: str) -> JobRow | None:
         """Take the lease of a job; None if another service was faster, or the job is not active any more."""
