@@ -52,14 +52,20 @@ class FarmPlan:
 
 
 class _Claims:
-    """Times and clients of all claims."""
+    """Times of all claims, and durations of all bakes."""
 
     def __init__(self) -> None:
         self._lock, self._times = threading.Lock(), dict[str, float]()
+        self.bake_s: list[float] = []
 
     def watch(self, service: BakeService) -> None:
-        """Record the successful claims of a machine."""
-        claim = service.ledger.claim
+        """Record the successful claims of a machine, and the ends of its bakes."""
+        claim, finish = service.ledger.claim, service.ledger.finish
+
+        def finished(identity: str, *args: Any, **fields: Any) -> bool:
+            with self._lock:
+                self.bake_s.append(time.monotonic() - self._times[identity])
+            return finish(identity, *args, **fields)
 
         def recorded(identity: str, owner: str) -> bool:
             has_claimed = claim(identity, owner)
@@ -68,7 +74,7 @@ class _Claims:
                     self._times.setdefault(identity, time.monotonic())
             return has_claimed
 
-        service.ledger.claim = recorded  # type: ignore[method-assign]
+        service.ledger.claim, service.ledger.finish = recorded, finished  # type: ignore[method-assign]
 
     def by_time(self) -> list[tuple[float, str]]:
         """Times and ids, earliest first."""
@@ -81,6 +87,7 @@ def run(plan: FarmPlan) -> dict[str, Any]:
 
     Returns:
         claim_s: seconds from queueing to each of the first `num_machines` claims. fairness: see `fairness`.
+        bake_s: mean seconds from the claim of a bake to its end.
         cpu_s, wall_s, calls: of the time from queueing to the last bake.
     """
     method = SleepingMethod(plan.num_tasks, plan.task_s, plan.shard_bytes, NOT_TINY_RAYS)
@@ -98,8 +105,8 @@ def run(plan: FarmPlan) -> dict[str, Any]:
         costs = first.plan(scene, Recipe("direct", ("front",), (64, 48), 10))
         num_lights = iter(range(10, 10 + plan.num_bakes))
         clients = {}
-        for client, part in CLIENTS:
-            for _ in range(plan.num_bakes * part // sum(part for _, part in CLIENTS)):
+        for client, fraction in CLIENTS:
+            for _ in range(plan.num_bakes * fraction // sum(fraction for _, fraction in CLIENTS)):
                 recipe = Recipe("direct", ("front",), (64, 48), next(num_lights))
                 clients[first.ledger.submit(scene, recipe, costs, client)] = client
         _set_states(first, clients, "canceled")
@@ -124,6 +131,7 @@ def run(plan: FarmPlan) -> dict[str, Any]:
         "fairness": fairness([clients[identity] for _, identity in first_wave], list(clients.values())),
         "wall_s": wall_s,
         "cpu_s": spent_s,
+        "bake_s": sum(claims.bake_s) / max(1, len(claims.bake_s)),
         "ready": len(ready),
         "bakes": len(clients),
         "statements": statements,

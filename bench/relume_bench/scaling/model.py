@@ -11,17 +11,21 @@ from dataclasses import dataclass
 from relume_server.auth.tokens import TOKEN_CACHE_S
 from relume_server.collaboration.comment_sync import POLL_INTERVAL_S as COMMENT_POLL_S
 from relume_server.collaboration.room_lease import RENEW_INTERVAL_S
+from relume_server.runtime.shared_poll import JITTER
 from relume_server.session.audit_edits import WRITE_INTERVAL_S
 from relume_server.session.frames.bake_updates import POLL_S as SCENE_POLL_S
 from relume_worker.jobs.job_service import POLL_INTERVAL_S as JOB_POLL_S
-from relume_worker.lease import HEARTBEAT_S
+from relume_worker.lease import HEARTBEAT_S, RENEW_S
 from relume_worker.service import POLL_S as BAKE_POLL_S
 
+_MEAN_INTERVAL = 1 - JITTER / 2
 NUM_LANES = 2
 """Threads of each server and worker machine that look for bakes: tiny ones, and all others."""
 
-CALLS_PER_TASK = 5
-"""Renew the lease, read and write the row of the task, and record progress; another record if the runner woke up."""
+CALLS_PER_BAKE, CALLS_PER_TASK = 28, 4
+"""Claim, expected work, start, phases, publishing and end; of a task: renew the lease, read and write its row, record
+progress.
+"""
 
 
 @dataclass(frozen=True)
@@ -29,15 +33,13 @@ class Population:
     """Who uses one ledger at a time.
 
     Attributes:
-        servers: server processes. machines: of a farm. people: with a session each. scenes: different scenes open on a
-            server, summed over servers. servers_with_rooms: of the servers.
+        servers: server processes. machines: of a farm. people: with a session each. servers_with_rooms: of the servers.
         editing: fraction of the people that edit at least once a minute.
     """
 
     servers: int
     machines: int
     people: int
-    scenes: int
     servers_with_rooms: int
     editing: float = 1.0
 
@@ -47,8 +49,8 @@ def calls_per_s(who: Population) -> dict[str, float]:
     return {
         "queue of bakes": (who.servers + who.machines) * NUM_LANES / BAKE_POLL_S,
         "queue of jobs": who.servers / JOB_POLL_S,
-        "bakes of open scenes": who.scenes / SCENE_POLL_S,
-        "tokens": who.people / TOKEN_CACHE_S,
+        "bakes of open scenes": who.servers / (_MEAN_INTERVAL * SCENE_POLL_S),
+        "tokens": who.servers / (_MEAN_INTERVAL * TOKEN_CACHE_S),
         "rooms": who.servers_with_rooms * (3 / RENEW_INTERVAL_S + 1 / COMMENT_POLL_S),
         "audit": who.people * who.editing / WRITE_INTERVAL_S,
     }
@@ -56,8 +58,7 @@ def calls_per_s(who: Population) -> dict[str, float]:
 
 def bake_calls(num_tasks: int, seconds: float) -> float:
     """Statements of one bake. seconds: from claim to ready."""
-    claim_and_start, heartbeats, end = 16, 2 * seconds / HEARTBEAT_S, 4
-    return claim_and_start + heartbeats + CALLS_PER_TASK * num_tasks + end
+    return CALLS_PER_BAKE + CALLS_PER_TASK * num_tasks + seconds * (1 / HEARTBEAT_S + 1 / RENEW_S)
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class Habits:
 
 
 @dataclass(frozen=True)
-class Place:
+class Workplace:
     """Where a person works: port of the server, bake, token, and room if any."""
 
     port: int
@@ -117,18 +117,18 @@ class Crowd:
     """People with open sessions; an asynchronous context.
 
     Args:
-        places: one for each person. habits: of all. together: sessions that open at a time.
+        workplaces: one for each person. habits: of all. together: sessions that open at a time.
     """
 
-    def __init__(self, places: Sequence[Place], habits: Habits, together: int = 16) -> None:
-        self._places, self._habits, self._opening = places, habits, asyncio.Semaphore(together)
+    def __init__(self, workplaces: Sequence[Workplace], habits: Habits, together: int = 16) -> None:
+        self._workplaces, self._habits, self._opening = workplaces, habits, asyncio.Semaphore(together)
         self.experience = Experience()
         self._people: list[_Person] = []
         self._tasks: list[asyncio.Task[None]] = []
         self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> Crowd:
-        await asyncio.gather(*(self._open(place, seed) for seed, place in enumerate(self._places)))
+        await asyncio.gather(*(self._open(workplace, seed) for seed, workplace in enumerate(self._workplaces)))
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -136,10 +136,13 @@ class Crowd:
             task.cancel()
         await self._stack.aclose()
 
-    async def _open(self, place: Place, seed: int) -> None:
-        prefix = "" if place.room is None else f"?room_prefix={place.room[:_PREFIX]}"
-        url = f"ws://127.0.0.1:{place.port}/api/bakes/{place.bake}/session{prefix}"
-        headers, room = {"Authorization": f"Bearer {place.token}"}, {} if place.room is None else {"room": place.room}
+    async def _open(self, workplace: Workplace, seed: int) -> None:
+        prefix = "" if workplace.room is None else f"?room_prefix={workplace.room[:_PREFIX]}"
+        url = f"ws://127.0.0.1:{workplace.port}/api/bakes/{workplace.bake}/session{prefix}"
+        headers, room = (
+            {"Authorization": f"Bearer {workplace.token}"},
+            {} if workplace.room is None else {"room": workplace.room},
+        )
         options = {"max_size": None, "compression": None, "open_timeout": 60, "ping_interval": None, "proxy": None}
         async with self._opening:
             connection = await connect(url, subprotocols=[SPEAKS], additional_headers=headers, **options)  # type: ignore[arg-type]

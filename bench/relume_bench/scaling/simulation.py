@@ -36,7 +36,7 @@ from relume_bench.scaling.farm import FarmPlan
 from relume_bench.scaling.ledgers import TemporaryLedger, has_postgresql, temporary_ledger
 from relume_bench.scaling.model import Population, UnitCosts, bake_calls, calls_per_s, total
 from relume_bench.scaling.object_store import LocalStore, local_store
-from relume_bench.scaling.people import ROOM_SIZE, Crowd, Experience, Habits, Place
+from relume_bench.scaling.people import ROOM_SIZE, Crowd, Experience, Habits, Workplace
 from relume_server.auth.tokens import TokenRow, TokenStore, _digest
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
@@ -137,8 +137,8 @@ async def _run(
 ) -> dict[str, Any]:  # fmt: skip
     """Calibrate, then let everybody work at once."""
     costs, calls_to_open = await _calibrate(servers[0], bakes[: max(1, len(bakes) // 8)], tokens[-16:], sizes)
-    places = _places(servers, bakes, tokens, sizes, Habits().in_rooms)
-    crowd = Crowd(places, Habits())
+    workplaces = _workplaces(servers, bakes, tokens, sizes, Habits().in_rooms)
+    crowd = Crowd(workplaces, Habits())
     async with crowd:
         await asyncio.sleep(1.0)
         crowd.experience.begin()
@@ -148,16 +148,15 @@ async def _run(
         farm.begin()
         await crowd.work(sizes.seconds)
         after, seconds = [server.read() for server in servers], time.monotonic() - start_s
-        result = _people_result(before, after, crowd.experience, places, costs, seconds)
+        result = _people_result(before, after, crowd.experience, workplaces, costs, seconds)
         connections = ledger.num_connections()
         farm_result = await asyncio.to_thread(farm.result)
         whole_s = time.monotonic() - start_s
         at_end = [server.read() for server in servers]
     all_calls = sum(_statements(first, last).total() for first, last in zip(before, at_end, strict=True))
     farm_calls = sum(farm_result["statements"].values())
-    polls = calls_per_s(Population(0, sizes.machines, 0, 0, 0))["queue of bakes"] * farm_result["wall_s"]
-    bake_s = sizes.tasks * sizes.task_s
-    predicted_farm = polls + farm_result["bakes"] * bake_calls(sizes.tasks, bake_s)
+    polls = calls_per_s(Population(0, sizes.machines, 0, 0))["queue of bakes"] * farm_result["wall_s"]
+    predicted_farm = polls + farm_result["ready"] * bake_calls(sizes.tasks, farm_result["bake_s"])
     database_s = ledger.cpu_s() - database_s
     return {
         **result,
@@ -189,8 +188,8 @@ async def _calibrate(server: _Server, bakes: list[str], tokens: list[str], sizes
     await asyncio.sleep(sizes.calibration_s)
     states.append(server.read())
     number = min(len(tokens), sizes.people)
-    places = [Place(server.port, bakes[k % len(bakes)], tokens[k]) for k in range(number)]
-    async with Crowd(places, _STILL) as crowd:
+    workplaces = [Workplace(server.port, bakes[k % len(bakes)], tokens[k]) for k in range(number)]
+    async with Crowd(workplaces, _STILL) as crowd:
         states.append(server.read())
         await crowd.work(sizes.calibration_s)
         states.append(server.read())
@@ -199,7 +198,7 @@ async def _calibrate(server: _Server, bakes: list[str], tokens: list[str], sizes
     opening = (states[2]["cpu_s"] - states[1]["cpu_s"] - idle * opening_s) / number
     still_s = states[3]["time_s"] - states[2]["time_s"]
     session = (states[3]["cpu_s"] - states[2]["cpu_s"] - idle * still_s) / (number * still_s)
-    async with Crowd(places, _BUSY) as crowd:
+    async with Crowd(workplaces, _BUSY) as crowd:
         await crowd.work(min(1.0, sizes.calibration_s))
         crowd.experience.begin()
         states.append(server.read())
@@ -213,9 +212,11 @@ async def _calibrate(server: _Server, bakes: list[str], tokens: list[str], sizes
     return UnitCosts(idle, max(0.0, session), max(0.0, opening), max(1e-9, frame)), calls
 
 
-def _places(servers: list[_Server], bakes: list[str], tokens: list[str], sizes: _Sizes, in_rooms: float) -> list[Place]:
+def _workplaces(
+    servers: list[_Server], bakes: list[str], tokens: list[str], sizes: _Sizes, in_rooms: float
+) -> list[Workplace]:
     """Everybody's server, bake and room, as a balancer would choose: by the bake, or by the room."""
-    places = []
+    workplaces = []
     num_together = int(sizes.people * in_rooms) // ROOM_SIZE * ROOM_SIZE
     for person in range(sizes.people):
         if person < num_together:
@@ -224,29 +225,28 @@ def _places(servers: list[_Server], bakes: list[str], tokens: list[str], sizes: 
         else:
             number = person % len(bakes)
             server, bake, room = servers[number % len(servers)], bakes[number], None
-        places.append(Place(server.port, bake, tokens[person], room))
-    return places
+        workplaces.append(Workplace(server.port, bake, tokens[person], room))
+    return workplaces
 
 
 def _people_result(
-    before: list[dict[str, Any]], after: list[dict[str, Any]], experience: Experience, places: list[Place],
+    before: list[dict[str, Any]], after: list[dict[str, Any]], experience: Experience, workplaces: list[Workplace],
     costs: UnitCosts, seconds: float,
 ) -> dict[str, Any]:  # fmt: skip
     """What the servers spent while people worked, measured and predicted."""
     statements = sum((_statements(*pair) for pair in zip(before, after, strict=True)), Counter[str]())
-    with_rooms = {place.port for place in places if place.room is not None}
-    scenes = {(place.port, place.bake) for place in places}
-    who = Population(len(before), 0, len(places), len(scenes), len(with_rooms))
+    with_rooms = {workplace.port for workplace in workplaces if workplace.room is not None}
+    who = Population(len(before), 0, len(workplaces), len(with_rooms))
     parts = calls_per_s(who)
     polled = parts["queue of bakes"] + parts["queue of jobs"]
     return {
         "seconds": seconds,
         "cpu_s": sum(last["cpu_s"] - first["cpu_s"] for first, last in zip(before, after, strict=True)),
-        "predicted_cpu_s": costs.cpu_s(len(before), len(places), seconds, experience.num_frames),
+        "predicted_cpu_s": costs.cpu_s(len(before), len(workplaces), seconds, experience.num_frames),
         "calls": statements.total(),
         "predicted_calls": total(parts) * seconds,
         "predicted_parts": {name: value * seconds for name, value in parts.items()},
-        "calls_per_person_s": (statements.total() / seconds - polled) / len(places),
+        "calls_per_person_s": (statements.total() / seconds - polled) / len(workplaces),
         "statements": dict(statements),
         "population": asdict(who),
         "edits": experience.num_edits,
