@@ -102,11 +102,11 @@ class Ledger:
     def bakes_of_scenes(self, scene_ids: Collection[str]) -> dict[str, list[BakeStatus]]:
         """Bakes of some scenes by scene, newest first; one statement, without positions in the queue."""
         query = select(BakeRow).where(BakeRow.scene_id.in_(scene_ids))
-        found: dict[str, list[BakeStatus]] = {}
+        bakes: dict[str, list[BakeStatus]] = {}
         with self.sessions() as session:
             for row in session.scalars(query.order_by(BakeRow.created.desc(), BakeRow.id)):
-                found.setdefault(row.scene_id, []).append(_status(row, {}))
-        return found
+                bakes.setdefault(row.scene_id, []).append(_status(row, {}))
+        return bakes
 
     def ready_bakes(self) -> list[str]:
         """Ids of all ready bakes, newest first."""

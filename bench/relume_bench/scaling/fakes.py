@@ -105,7 +105,7 @@ class ThreadExecutors(Executors):
         super().__init__(None, num_threads)
         self._threads = ThreadPoolExecutor(num_threads, "relume-simulated-worker")
 
-    def cluster(self, place: str = "bulk") -> Executor:
+    def cluster(self, kind: str = "bulk") -> Executor:
         return self._threads
 
     @property

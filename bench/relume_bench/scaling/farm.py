@@ -33,7 +33,7 @@ CLIENTS = (("many", 3), ("some", 1), ("few", 1))
 
 @dataclass(frozen=True)
 class FarmPlan:
-    """What a farm does.
+    """Work of a farm.
 
     Attributes:
         ledger: URL. folder: data directory; with an object storage each machine has one of its own in it.

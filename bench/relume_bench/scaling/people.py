@@ -23,7 +23,7 @@ _PREFIX = 8
 
 @dataclass(frozen=True)
 class Habits:
-    """What a person does.
+    """Habits of a person.
 
     Attributes:
         think_s: mean time between bursts, exponentially distributed. burst: edits of a burst. rate: edits a second in
@@ -38,7 +38,7 @@ class Habits:
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where a person works: port of the server, bake, token, and room if any."""
+    """Session of a person: port of the server, bake, token, and room if any."""
 
     port: int
     bake: str
@@ -48,7 +48,7 @@ class Workplace:
 
 @dataclass
 class Experience:
-    """What all people together saw.
+    """Answers that all people together had.
 
     Attributes:
         edit_s: seconds from each edit to a frame that shows it. num_frames, num_bytes: received since `begin`.
@@ -139,10 +139,8 @@ class Crowd:
     async def _open(self, workplace: Workplace, seed: int) -> None:
         prefix = "" if workplace.room is None else f"?room_prefix={workplace.room[:_PREFIX]}"
         url = f"ws://127.0.0.1:{workplace.port}/api/bakes/{workplace.bake}/session{prefix}"
-        headers, room = (
-            {"Authorization": f"Bearer {workplace.token}"},
-            {} if workplace.room is None else {"room": workplace.room},
-        )
+        headers = {"Authorization": f"Bearer {workplace.token}"}
+        room = {} if workplace.room is None else {"room": workplace.room}
         options = {"max_size": None, "compression": None, "open_timeout": 60, "ping_interval": None, "proxy": None}
         async with self._opening:
             connection = await connect(url, subprotocols=[SPEAKS], additional_headers=headers, **options)  # type: ignore[arg-type]

@@ -37,7 +37,8 @@ from relume_bench.scaling.ledgers import TemporaryLedger, has_postgresql, tempor
 from relume_bench.scaling.model import Population, UnitCosts, bake_calls, calls_per_s, total
 from relume_bench.scaling.object_store import LocalStore, local_store
 from relume_bench.scaling.people import ROOM_SIZE, Crowd, Experience, Habits, Workplace
-from relume_server.auth.tokens import TokenRow, TokenStore, _digest
+from relume_server.auth.tables import TokenRow
+from relume_server.auth.tokens import TokenStore, _digest
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
@@ -49,7 +50,7 @@ _BUSY = Habits(think_s=0.05)
 
 @dataclass(frozen=True)
 class _Sizes:
-    """How much is simulated: people, seconds of their work, of the calibration, and the farm."""
+    """Sizes of a simulation: people, seconds of their work, of the calibration, and the farm."""
 
     people: int
     seconds: float
@@ -163,8 +164,8 @@ async def _run(
         "sizes": asdict(sizes),
         "unit_costs": asdict(costs),
         "calls_to_open": calls_to_open,
+        "claim_s": _percentiles(farm_result.pop("claim_s")),
         "farm": farm_result,
-        "claim_s": _percentiles(farm_result["claim_s"]),
         "farm_calls": farm_calls,
         "predicted_farm_calls": predicted_farm,
         "lock_errors": farm_result["lock_errors"] + sum(state["lock_errors"] for state in at_end),
@@ -233,7 +234,7 @@ def _people_result(
     before: list[dict[str, Any]], after: list[dict[str, Any]], experience: Experience, workplaces: list[Workplace],
     costs: UnitCosts, seconds: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """What the servers spent while people worked, measured and predicted."""
+    """Costs of the servers while people worked, measured and predicted."""
     statements = sum((_statements(*pair) for pair in zip(before, after, strict=True)), Counter[str]())
     with_rooms = {workplace.port for workplace in workplaces if workplace.room is not None}
     who = Population(len(before), 0, len(workplaces), len(with_rooms))
@@ -336,7 +337,7 @@ class _Farm:
         self._process.stdin.flush()
 
     def result(self) -> dict[str, Any]:
-        """What the farm has measured, when all bakes are ready."""
+        """Figures of the farm, when all bakes are ready."""
         return _answer(self._process)
 
 

@@ -53,7 +53,7 @@ class AuthServices:
         raise LoginError("your token expired or was revoked; log in with a new one")
 
     async def _are_valid(self, identities: Collection[str]) -> Mapping[str, bool]:
-        """Whether tokens are valid, by one statement; empty while the database is unavailable."""
+        """Validity of tokens, by one statement; empty while the database is unavailable."""
         try:
             return await run_sync(self.tokens.are_valid, identities)
         except DATABASE_ERRORS:

@@ -118,7 +118,7 @@ class TokenStore:
         return cached is not None and cached[0].is_valid(time.time())
 
     def are_valid(self, identities: Collection[str]) -> dict[str, bool]:
-        """Whether the tokens with these ids are valid now; asks the database once."""
+        """Validity of the tokens with these ids now; asks the database once."""
         with self._sessions() as session:
             rows = session.scalars(select(TokenRow).where(TokenRow.id.in_(identities)))
             valid = {row.id for row in rows if _token(row).is_valid(time.time())}
