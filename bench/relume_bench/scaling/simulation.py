@@ -39,6 +39,7 @@ from relume_bench.scaling.object_store import LocalStore, local_store
 from relume_bench.scaling.people import ROOM_SIZE, Crowd, Experience, Habits, Workplace
 from relume_server.auth.tables import TokenRow
 from relume_server.auth.tokens import TokenStore, _digest
+from relume_server.session.audit_edits import WRITE_INTERVAL_S
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
@@ -237,7 +238,8 @@ def _people_result(
     """Costs of the servers while people worked, measured and predicted."""
     statements = sum((_statements(*pair) for pair in zip(before, after, strict=True)), Counter[str]())
     with_rooms = {workplace.port for workplace in workplaces if workplace.room is not None}
-    who = Population(len(before), 0, len(workplaces), len(with_rooms))
+    editing = 0.0 if seconds < WRITE_INTERVAL_S else 1.0  # the audit writes at the end of its interval
+    who = Population(len(before), 0, len(workplaces), len(with_rooms), editing)
     parts = calls_per_s(who)
     polled = parts["queue of bakes"] + parts["queue of jobs"]
     return {

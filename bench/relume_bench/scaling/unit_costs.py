@@ -14,7 +14,7 @@ import struct
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +61,7 @@ def measure(tiny: bool) -> list[Figure]:
         with serving(data_folder) as server:
             values |= _measure_memory(server, data_folder, sizes)
             with _session(server, data_folder.bake) as client:
+                client.prepare(_SIGMA, sizes.seconds)
                 slider, num_bytes = client.drag(_slider_edit, sizes.seconds)
                 client.add_light()
                 light, _ = client.drag(_light_edit, sizes.seconds)
@@ -93,8 +94,8 @@ class _Client:
         self._connection, self._pid, self._number = connection, pid, 0
         self._hello: dict[str, Any] = json.loads(connection.recv())
 
-    def _frame(self) -> tuple[dict[str, Any], int]:
-        while isinstance(message := self._connection.recv(_WAIT_S), str):
+    def _frame(self, timeout_s: float = _WAIT_S) -> tuple[dict[str, Any], int]:
+        while isinstance(message := self._connection.recv(timeout_s), str):
             if json.loads(message)["type"] == "problem":
                 raise PlanError(f"the server refused: {message[:300]}")
         (length,) = struct.unpack_from("<I", message)
@@ -117,6 +118,11 @@ class _Client:
         self._send_message({"type": "edit", "revision": self._number, "patch": patch})
         self.until_exact()
 
+    def prepare(self, parameter: str, seconds: float) -> None:
+        """Announce a drag of a parameter, whose operator is computed in this time or a bit later."""
+        self._send_message({"type": "prepare", "parameter": parameter})
+        time.sleep(seconds)
+
     def camera_move(self, size: tuple[int, int]) -> Callable[[int], dict[str, Any]]:
         """Messages that move the free camera sideways."""
         view = self._hello["views"][0]
@@ -131,11 +137,22 @@ class _Client:
         return move
 
     def drag(self, message: Callable[[int], dict[str, Any]], seconds: float) -> tuple[float, float]:
-        """Milliseconds of the server's processor time and bytes of each frame; half a drag is done before."""
-        self._run(message, seconds / 2)
+        """Milliseconds of the server's processor time and bytes of each frame; a drag with a pause is done before, in
+        which the server prepares what it needs once.
+        """
+        self._run(message, seconds)
+        self._pause(seconds)
+        self._run(message, seconds / 4)
         spent_s = tree_cpu_s(self._pid)
         num_frames, num_bytes = self._run(message, seconds)
         return 1e3 * (tree_cpu_s(self._pid) - spent_s) / num_frames, num_bytes / num_frames
+
+    def _pause(self, seconds: float) -> None:
+        """Receive and acknowledge frames for some time."""
+        until_s = time.perf_counter() + seconds
+        while time.perf_counter() < until_s:
+            with suppress(TimeoutError):
+                self._frame(max(0.01, until_s - time.perf_counter()))
 
     def _run(self, message: Callable[[int], dict[str, Any]], seconds: float) -> tuple[int, int]:
         until_s, num_frames, num_bytes = time.perf_counter() + seconds, 0, 0
