@@ -90,7 +90,11 @@ def measure(tiny: bool) -> list[Figure]:
         "scaling.fairness": (last["farm"]["fairness"], "ratio"),
         "scaling.lock_errors": (float(sum(result["lock_errors"] for result in results.values())), "errors"),
     }
-    return [Figure(name, float(value), unit, context) for name, (value, unit) in values.items()]
+    elsewhere = {"see": "scaling.cpu_prediction"}
+    return [
+        Figure(name, float(value), unit, context if name == elsewhere["see"] else elsewhere)
+        for name, (value, unit) in values.items()
+    ]
 
 
 def _simulate(kind: str, sizes: _Sizes) -> dict[str, Any]:
