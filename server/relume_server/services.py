@@ -246,7 +246,7 @@ def _live(
         resumes=ResumeStore(settings.resume_seconds),
         rooms=rooms,
         room_lease=room_lease,
-        bake_updates=BakeUpdates(service.bakes, threads.queries),
+        bake_updates=BakeUpdates(service.ledger.bakes_of_scenes, threads.queries),
         access=access,
         drain=drain,
         ack_seconds=settings.ack_seconds,

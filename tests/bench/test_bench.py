@@ -33,7 +33,7 @@ LONG = [
     "probes_reference", "canvas_free_camera", "btf", "btf_accuracy", "btf_speed", "load",
     "btf_edit", "many_sessions", "refusal", "slider_drag", "probes_static_view", "rotation",
     "btf_several", "plan_disk", "probes_live", "probes_error", "real_files",
-    "opening", "flood", "slow_readers", "room_join", "render_workers",
+    "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
 ]  # fmt: skip
 # figures from random points or a noisy renderer have a standard error
 ESTIMATES = (

@@ -64,6 +64,19 @@ def test_client_who_returns_between_turns_keeps_its_share() -> None:
     assert 5 <= order.count("b") <= 7
 
 
+def test_idle_machines_do_not_all_begin_with_the_same_client() -> None:
+    clients = [f"a{k}" for k in range(4)] + ["b0", "b1"]
+    running: list[str] = []
+    for _ in range(4):  # a new machine each time
+        waiting = [
+            Waiting(each, each[0], False, k, sum(other[0] == each[0] for other in running))
+            for k, each in enumerate(clients)
+            if each not in running
+        ]
+        running.append(FairShare({}).sort(waiting)[0].id)
+    assert running == ["a0", "b0", "a1", "b1"]
+
+
 def test_weights_set_the_number_of_turns() -> None:
     turns = FairShare({"ann": 3.0})
     waiting = [Waiting("b", "bob", False, 1.0), Waiting("a", "ann", False, 2.0)]

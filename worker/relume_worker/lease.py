@@ -22,6 +22,8 @@ log = logging.getLogger(__name__)
 
 LEASE_S = 15.0
 HEARTBEAT_S = 1.0
+RENEW_S = LEASE_S / 5
+"""Interval of `LeaseRenewer`, which is for long steps: between them heartbeats renew the lease."""
 
 _NONCE = uuid.uuid4().hex
 _numbers = itertools.count()
@@ -112,7 +114,7 @@ class LeaseRenewer:
 
     def _run(self) -> None:
         database_error = DatabaseError(log, f"the lease of {self._work_id} cannot be renewed")
-        while not self._done.wait(HEARTBEAT_S):
+        while not self._done.wait(RENEW_S):
             try:
                 self._renew(self._work_id, self._owner)
                 database_error.report_recovered()

@@ -12,8 +12,9 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import CursorResult, Engine, delete, func, or_, select, update
@@ -99,6 +100,15 @@ class Ledger:
         queue_positions = self._queue_positions(rows)
         return [_status(row, queue_positions) for row in rows]
 
+    def bakes_of_scenes(self, scene_ids: Collection[str]) -> dict[str, list[BakeStatus]]:
+        """Bakes of some scenes by scene, newest first; one statement, without positions in the queue."""
+        query = select(BakeRow).where(BakeRow.scene_id.in_(scene_ids))
+        bakes: dict[str, list[BakeStatus]] = {}
+        with self.sessions() as session:
+            for row in session.scalars(query.order_by(BakeRow.created.desc(), BakeRow.id)):
+                bakes.setdefault(row.scene_id, []).append(_status(row, {}))
+        return bakes
+
     def ready_bakes(self) -> list[str]:
         """Ids of all ready bakes, newest first."""
         query = select(BakeRow.id).where(BakeRow.state == "ready").order_by(BakeRow.created.desc(), BakeRow.id)
@@ -121,11 +131,20 @@ class Ledger:
         return self._change(identity, ("queued", "running"), state="canceled", seconds_left=None, phase=None)
 
     def claimable(self) -> list[Waiting]:
-        """Bakes without a live owner, longest waiting first: queued, or left by a dead owner."""
-        query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
+        """Bakes without a live owner, longest waiting first: queued, or left by a dead owner. `is_first`: tiny ones."""
+        columns = BakeRow.id, BakeRow.client, BakeRow.plan, BakeRow.queued, BakeRow.owner, BakeRow.heartbeat
+        query = select(*columns, epoch_s().label("now")).where(BakeRow.state.in_(("queued", "running")))
         with self.sessions() as session:
-            rows = [row for row, now in session.execute(query) if not _is_owned(row, now)]
-        return [Waiting(row.id, row.client or "", False, row.queued) for row in rows]
+            rows = list(session.execute(query.order_by(BakeRow.queued)))
+        is_owned = [_is_owned(row, row.now) for row in rows]
+        num_running = Counter(
+            (row.client or "", is_tiny(_plan(row.plan))) for row, is_run in zip(rows, is_owned, strict=True) if is_run
+        )
+        waiting = []
+        for row in (row for row, is_run in zip(rows, is_owned, strict=True) if not is_run):
+            lane = row.client or "", is_tiny(_plan(row.plan))
+            waiting.append(Waiting(row.id, *lane, row.queued, num_running[lane]))
+        return waiting
 
     def claim(self, identity: str, owner: str) -> bool:
         """Take the lease of a bake and set it running. False if another owner has it."""
@@ -306,7 +325,7 @@ def _execute(session: Session, statement: Any) -> Any:
     return session.execute(statement, execution_options={"synchronize_session": False})
 
 
-def _is_owned(row: BakeRow, now: float) -> bool:
+def _is_owned(row: Any, now: float) -> bool:
     return row.owner is not None and is_alive(row.owner, row.heartbeat, now)
 
 
@@ -326,6 +345,7 @@ def _plan_json(plan: Plan) -> str:
     return json.dumps(document)
 
 
+@lru_cache(maxsize=4096)  # of the same rows, twice a second
 def _plan(text: str) -> Plan:
     return Plan(**json.loads(text))
 

@@ -25,7 +25,7 @@ from relume_worker.estimate import crowding, estimate_seconds, machine_load
 from relume_worker.executor import Executors, is_tiny
 from relume_worker.idle_timer import idle_seconds
 from relume_worker.jobs.fair_share import FairShare
-from relume_worker.lease import new_owner
+from relume_worker.lease import LeaseRenewer, new_owner
 from relume_worker.ledger import Ledger
 from relume_worker.paths import bake_path, scene_path
 from relume_worker.progress import ExpectedWork
@@ -269,13 +269,12 @@ class BakeService:
 
     def _run_next(self, tiny: bool) -> bool:
         fair_share = self._fair_shares[tiny]
-        for waiting_bake in fair_share.sort(self.ledger.claimable()):
-            status = self.ledger.bake(waiting_bake.id)
+        for waiting_bake in fair_share.sort([each for each in self.ledger.claimable() if each.is_first == tiny]):
             try:
-                if is_tiny(status.plan) == tiny and self.ledger.claim(waiting_bake.id, self._owner):
+                if self.ledger.claim(waiting_bake.id, self._owner):
                     self._blocked_bakes.report_resumed(waiting_bake.id)
                     fair_share.pick_next(waiting_bake.client)
-                    self._run(status, tiny)
+                    self._run(self.ledger.bake(waiting_bake.id), tiny)
                     return True
             except Exception as error:
                 self._blocked_bakes.report_blocked(self.ledger.bake(waiting_bake.id), error)
@@ -291,7 +290,8 @@ class BakeService:
             if not tiny:
                 self.ledger.heartbeat(status.id, self._owner, phase="starting", phase_since=time.time())
                 self._status_bus.notify_change()
-            executor = self.executors.local() if tiny else self.executors.cluster()
+            with LeaseRenewer(self.ledger.renew_lease, status.id, self._owner):  # starting a cluster may take longer
+                executor = self.executors.local() if tiny else self.executors.cluster()
         except SQLAlchemyError:  # its lease expires, and it is claimed again
             raise
         except Exception as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 from anyio.to_thread import run_sync
@@ -14,6 +15,7 @@ from relume_server.auth.quotas import Quotas
 from relume_server.auth.roles import Caller
 from relume_server.auth.tokens import TOKEN_CACHE_S, TokenStore
 from relume_server.errors import LoginError
+from relume_server.runtime.shared_poll import SharedPoll
 from relume_worker.database.failures import DATABASE_ERRORS
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ class AuthServices:
         self.tokens, self.identity = TokenStore(sessions), Identity(settings)
         self.quotas = Quotas(sessions, settings)
         self.audit = Audit(sessions, settings.audit_lines)
+        self._validity = SharedPoll(self._are_valid, lambda: TOKEN_CACHE_S)
 
     async def record(self, change: Change) -> None:
         """Add an audit row, in a thread."""
@@ -41,9 +44,20 @@ class AuthServices:
         Raises:
             LoginError: the token expired or was revoked.
         """
-        while await self.may_stay(caller):
-            await asyncio.sleep(TOKEN_CACHE_S)
+        if caller.token is None:
+            await asyncio.Event().wait()
+            return
+        with self._validity.following(caller.token):
+            while await self._validity.next(caller.token) is not False:
+                pass
         raise LoginError("your token expired or was revoked; log in with a new one")
+
+    async def _are_valid(self, identities: Collection[str]) -> Mapping[str, bool]:
+        """Validity of tokens, by one statement; empty while the database is unavailable."""
+        try:
+            return await run_sync(self.tokens.are_valid, identities)
+        except DATABASE_ERRORS:
+            return {}
 
     async def may_stay(self, caller: Caller) -> bool:
         """True if the caller is still authorized; also while the database is unavailable."""

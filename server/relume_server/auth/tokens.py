@@ -10,6 +10,7 @@ import hmac
 import secrets
 import time
 from collections import OrderedDict
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from sqlalchemy import select
@@ -115,6 +116,13 @@ class TokenStore:
         """True if the token with this id is still valid."""
         cached = self._fetch(identity)
         return cached is not None and cached[0].is_valid(time.time())
+
+    def are_valid(self, identities: Collection[str]) -> dict[str, bool]:
+        """Validity of the tokens with these ids now; asks the database once."""
+        with self._sessions() as session:
+            rows = session.scalars(select(TokenRow).where(TokenRow.id.in_(identities)))
+            valid = {row.id for row in rows if _token(row).is_valid(time.time())}
+        return {identity: identity in valid for identity in identities}
 
     def _fetch(self, identity: str) -> tuple[Token, str] | None:
         now_s, cached = time.monotonic(), self._cached.get(identity)

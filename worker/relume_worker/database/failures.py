@@ -52,6 +52,11 @@ def is_unavailable(error: Exception) -> bool:
     return isinstance(error, DBAPIError) and _is_unanswered(error.orig)
 
 
+def is_locked(error: Exception) -> bool:
+    """True if other writers of a SQLite file were ahead for longer than the timeout, so that retrying helps."""
+    return isinstance(error, DBAPIError) and getattr(error.orig, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
+
+
 def describe_error(error: BaseException) -> str:
     """Describe an error in one line."""
     cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error

@@ -8,7 +8,7 @@ from typing import ParamSpec, TypeVar
 
 from sqlalchemy.exc import DBAPIError
 
-from relume_worker.database.failures import is_unavailable
+from relume_worker.database.failures import is_locked, is_unavailable
 
 RETRY_S = 1.0
 
@@ -19,7 +19,7 @@ Given = ParamSpec("Given")
 def with_retry(
     gives_up: Callable[[], bool], call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs
 ) -> Result:
-    """Call the ledger, and retry as long as the database is unavailable.
+    """Call the ledger, and retry as long as the database is unavailable, or locked by others.
 
     Args:
         gives_up: true to stop waiting; then the error propagates, as all other errors do at once.
@@ -29,6 +29,6 @@ def with_retry(
         try:
             return call(*args, **kwargs)
         except DBAPIError as error:
-            if not is_unavailable(error) or gives_up():
+            if not (is_unavailable(error) or is_locked(error)) or gives_up():
                 raise
             time.sleep(RETRY_S)

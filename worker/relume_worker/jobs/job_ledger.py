@@ -7,7 +7,9 @@ the lease notices at its next statement on the row, and drops its work.
 from __future__ import annotations
 
 import json
+import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
@@ -22,6 +24,8 @@ from relume_worker.jobs.fair_share import Waiting
 from relume_worker.jobs.job import BusyError, JobFilter, NotReadyError, Quota, QuotaError, noun
 from relume_worker.lease import is_alive, log_taken_over
 
+HOLDS_S = 0.1
+
 
 class JobLedger:
     """Jobs of all kinds in the database.
@@ -32,6 +36,7 @@ class JobLedger:
 
     def __init__(self, sessions: sessionmaker[Session], quota: Quota, owner: str) -> None:
         self._sessions, self._quota, self.owner = sessions, quota, owner
+        self._leased, self._leased_until_s, self._asking = frozenset[str](), 0.0, threading.Lock()
 
     def add(self, row: JobRow, prepare: Callable[[], object]) -> None:
         """Queue a job.
@@ -131,8 +136,13 @@ class JobLedger:
         columns = JobRow.id, JobRow.client, JobRow.is_first, JobRow.created, JobRow.owner, JobRow.heartbeat
         query = select(*columns, epoch_s().label("now")).where(JobRow.state.in_(ACTIVE_STATES))  # requests may be large
         with self._sessions() as session:
-            rows = [row for row in session.execute(query) if row.id not in running and not self._is_leased(row)]
-        return [Waiting(row.id, row.client or "", bool(row.is_first), row.created) for row in rows]
+            rows = [(row, self._is_leased(row)) for row in session.execute(query)]
+        num_elsewhere = Counter(row.client or "" for row, is_leased in rows if is_leased)
+        return [
+            Waiting(row.id, client := row.client or "", bool(row.is_first), row.created, num_elsewhere[client])
+            for row, is_leased in rows
+            if not is_leased and row.id not in running
+        ]
 
     def claim(self, identity: str) -> JobRow | None:
         """Take the lease of a job; None if another service was faster, or the job is not active any more."""
@@ -167,10 +177,22 @@ class JobLedger:
         )
 
     def holds_lease(self, identity: str) -> bool:
-        """True if the job is active, and its lease is here."""
-        with self._sessions() as session:
-            row = session.get(JobRow, identity)
-        return row is not None and row.state in ACTIVE_STATES and row.owner == self.owner
+        """True if the job was active, and its lease here, at most `HOLDS_S` ago; all jobs share one statement."""
+        asked_s, is_known = time.monotonic(), identity in self._leased
+        if is_known and asked_s < self._leased_until_s:
+            return True
+        is_only = self._asking.acquire(blocking=False)
+        try:
+            if is_known and not is_only:  # another thread asks for all
+                return True
+            with self._sessions() as session:
+                query = select(JobRow.id).where(JobRow.owner == self.owner, JobRow.state.in_(ACTIVE_STATES))
+                self._leased = frozenset(session.scalars(query))
+            self._leased_until_s = asked_s + HOLDS_S
+        finally:
+            if is_only:
+                self._asking.release()
+        return identity in self._leased
 
     def release(self, identity: str) -> bool:
         """Give up a lease. False if it was lost before."""

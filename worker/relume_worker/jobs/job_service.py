@@ -30,7 +30,7 @@ from relume_worker.jobs.step_timer import StepTimer
 from relume_worker.lease import HEARTBEAT_S, log_lost_lease
 
 log = logging.getLogger(__name__)
-_POLL_INTERVAL_S = 2.0
+POLL_INTERVAL_S = 2.0
 MAX_RUNNING = 64
 MAX_RUNNING_PER_CLIENT = 4
 """More would only wait for their turns, and could not run on another server; small jobs are not counted."""
@@ -104,7 +104,7 @@ class JobService:
                 self._outage.report_recovered()
             except Exception as error:  # the thread must survive an unavailable database
                 self._outage.report_failure(error)
-            self._wake.wait(timeout=_POLL_INTERVAL_S)
+            self._wake.wait(timeout=POLL_INTERVAL_S)
 
     def _claim_next(self) -> bool:
         """Claim the next job, and start its thread. False if there is none, or enough are running."""
