@@ -308,6 +308,7 @@ class _Server:
             self._process.wait(60)
         except subprocess.TimeoutExpired:
             self._process.kill()
+        _close(self._process)
 
     def read(self) -> dict[str, Any]:
         """State of the process, see `relume_bench.scaling.server`."""
@@ -334,7 +335,7 @@ class _Farm:
     def __exit__(self, *_: object) -> None:
         if self._process.poll() is None:
             self._process.kill()
-        self._process.wait()
+        _close(self._process)
 
     def begin(self) -> None:
         """Queue the bakes."""
@@ -349,6 +350,14 @@ class _Farm:
 
 def _start(command: list[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
     return subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def _close(process: subprocess.Popen[str]) -> None:
+    """Wait for the end of a process, and close its pipes."""
+    process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            stream.close()
 
 
 def _ask(process: subprocess.Popen[str]) -> dict[str, Any]:
