@@ -66,7 +66,7 @@ def test_large_maps_are_downsampled_and_keep_their_brightness(tmp_path, monkeypa
     path = write_map(tmp_path / "large.exr", pixels)
     with STORE.with_search_folder(tmp_path / "library") as folder:
         record = store_environment(folder, path, "Large")
-        assert record.warnings == ("HDRI “Large” was scaled from 96×48 to 32×16.",)
+        assert record.warnings == ("Environment “Large” was scaled from 96×48 to 32×16.",)
         radiance = load_environment(record.map).radiance
     np.testing.assert_allclose(radiance, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
 
