@@ -82,14 +82,17 @@ class SleepingMethod:
         return {"method": self.name, "scene": scene.id, "views": list(recipe.views), "size": list(recipe.size)}
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
+        """See `BakeMethod`."""
         num = self.shard_bytes // 4
         return [ArraySpec("values", (num * self.num_tasks,), "float32", (num,), (num,))]
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
+        """See `BakeMethod`."""
         num = self.shard_bytes // 4
         return [Task(0, index, "", index * num, (index + 1) * num) for index in range(self.num_tasks)]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
+        """See `BakeMethod`."""
         time.sleep(self.task_s)
         return TaskOutput({"values": np.full(self.shard_bytes // 4, task.index, np.float32)}, 10, 0.0)
 
@@ -250,6 +253,7 @@ class SleepingSteps:
 
     def __init__(self, *_: object) -> None: ...
     def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
+        """See `RunStep`."""
         time.sleep(float(step.values["seconds"]))
         return {}
 

@@ -71,7 +71,11 @@ class UnitCosts:
     frame: float
 
     def cpu_s(self, servers: int, people: int, seconds: float, num_frames: int) -> float:
-        """Processor seconds of all servers while nobody opens a session."""
+        """Processor seconds of all servers while nobody opens a session.
+
+        Args:
+            servers: number of servers. people: number of people. seconds: duration. num_frames: frames of all people.
+        """
         return seconds * (servers * self.idle + people * self.session) + num_frames * self.frame
 
 
@@ -85,7 +89,12 @@ def people_per_core(costs: UnitCosts, frames_per_s: float, use: float = 0.7) -> 
 
 
 def people_per_database(calls_per_person_s: float, calls_per_core_s: float, cores: int, use: float = 0.7) -> float:
-    """People that a database with so many cores serves."""
+    """People that a database serves.
+
+    Args:
+        calls_per_person_s: statements per second of a person. calls_per_core_s: statements per second of a core.
+        cores: cores of the database. use: used part of the cores; above it, queues grow.
+    """
     return use * cores * calls_per_core_s / calls_per_person_s
 
 

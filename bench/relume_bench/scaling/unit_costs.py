@@ -37,7 +37,7 @@ _WAIT_S = 120.0
 
 
 @dataclass(frozen=True)
-class _Sizes:
+class _Workload:
     """Pixels, lights and probes of the bakes; seconds of a drag; sessions for the memory; frames of a batch."""
 
     size: tuple[int, int]
@@ -50,7 +50,7 @@ class _Sizes:
 
 def measure(tiny: bool) -> list[Figure]:
     """Bake for a fixed and a free camera, serve, drag, open more sessions, render a batch."""
-    sizes = _Sizes((48, 32), 20, 300, 0.3, 2, 2) if tiny else _Sizes((640, 480), 1000, 13_000, 4.0, 8, 8)
+    sizes = _Workload((48, 32), 20, 300, 0.3, 2, 2) if tiny else _Workload((640, 480), 1000, 13_000, 4.0, 8, 8)
     glossy = (LAMBERT, cook_torrance(0.2))
     fixed = Recipe("direct", ("front",), sizes.size, sizes.lights)
     free = Recipe("probes", ("front",), sizes.size, sizes.lights, num_probes=sizes.probes)
@@ -190,7 +190,7 @@ def _session(server: Server, bake: str) -> Iterator[_Client]:
         yield client
 
 
-def _measure_memory(server: Server, data_folder: BakedFolder, sizes: _Sizes) -> dict[str, tuple[float, str]]:
+def _measure_memory(server: Server, data_folder: BakedFolder, sizes: _Workload) -> dict[str, tuple[float, str]]:
     """Memory of an open view, with the results of its first image, and of each further session on it."""
     before = resident_bytes(server.pid)
     with _session(server, data_folder.bake):
