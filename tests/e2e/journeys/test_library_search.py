@@ -38,6 +38,8 @@ def test_a_look_is_named_when_it_is_saved_and_again_later(editor: Editor) -> Non
     name.fill("Morning")
     name.press("Enter")
     title = page.get_by_role("button", name="Rename Morning")
+    expect(title).to_be_visible()
+    expect(saved).to_have_count(before + 1)  # the tile of the first name is gone, and no other moves under the pointer
     title.click()
     again = page.get_by_role("textbox", name="New name of Morning")
     again.fill("Evening")
