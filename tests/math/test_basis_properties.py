@@ -36,14 +36,14 @@ def test_wavelets_reconstruct_bands_and_keep_their_energy(bands):
 @for_all(40, bands=ROWS, fraction=st.floats(0.0, 1.0))
 def test_the_error_of_few_wavelets_is_the_energy_of_the_others(bands, fraction):
     coefficients = daubechies.analysis(bands)
-    num_kept = round(fraction * bands.shape[1])
-    left_out = np.argsort(-np.abs(coefficients), axis=1)[:, num_kept:]
+    num_retained = round(fraction * bands.shape[1])
+    left_out = np.argsort(-np.abs(coefficients), axis=1)[:, num_retained:]
     some = coefficients.copy()
     np.put_along_axis(some, left_out, 0.0, axis=1)
     error = np.linalg.norm(daubechies.synthesis(some) - bands, axis=1)
     np.testing.assert_allclose(error, np.linalg.norm(coefficients - some, axis=1), rtol=1e-9, atol=1e-10)
     # the largest have at least the mean energy
-    assert (error <= np.linalg.norm(bands, axis=1) * np.sqrt(1 - num_kept / bands.shape[1]) + 1e-10).all()
+    assert (error <= np.linalg.norm(bands, axis=1) * np.sqrt(1 - num_retained / bands.shape[1]) + 1e-10).all()
 
 
 @for_all(40, bands=ROWS)

@@ -173,6 +173,7 @@ class JobKind(ABC, Generic[Request]):
         Raises:
             NotReadyError: it is in another state, or its request cannot be read. BusyError, QuotaError: as `submit`.
         """
-        self.check_readable(self.get(identity))
-        self._service.ledger.requeue(self._service.ledger.get(self.name, identity), states, prepare)
+        row = self._service.ledger.get(self.name, identity)
+        self.check_readable(self.job(row))
+        self._service.ledger.requeue(row, states, prepare)
         self._service.wake()

@@ -25,6 +25,7 @@ from relume_worker.jobs.job import BusyError, JobFilter, NotReadyError, Quota, Q
 from relume_worker.lease import is_alive, log_taken_over
 
 HOLDS_S = 0.1
+"""Age of an answer of `holds_lease`; steps ask thousands of times per second."""
 
 
 class JobLedger:

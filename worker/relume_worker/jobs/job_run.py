@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
@@ -13,8 +12,6 @@ from relume_worker.jobs.job import Job, Request, noun
 from relume_worker.jobs.job_ledger import JobLedger
 from relume_worker.jobs.step import RunStep, Step
 from relume_worker.jobs.step_timer import StepTimer
-
-_CHECK_INTERVAL_S = 0.1
 
 
 class StepHost(Protocol):
@@ -48,7 +45,6 @@ class JobRun(Generic[Request]):
         """
         self._host, self._kind, self._is_first = host, kind, is_first
         self.job, self.folder, self.timer = job, folder, StepTimer(step_s)
-        self._needed_until_s = 0.0
         self._error: BaseException | None = None  # of the first step that failed
 
     def record(self, done: int) -> None:
@@ -63,13 +59,8 @@ class JobRun(Generic[Request]):
 
     def is_needed(self) -> bool:
         """True unless the job was stopped, deleted or taken over a moment ago, or the service is closing."""
-        if self._host.is_closing or self._error is not None:
-            return False
-        if time.monotonic() < self._needed_until_s:
-            return True  # steps ask thousands of times per second
-        is_needed = self._host.ledger.holds_lease(self.job.id)
-        self._needed_until_s = time.monotonic() + _CHECK_INTERVAL_S if is_needed else 0.0
-        return is_needed
+        is_over = self._host.is_closing or self._error is not None
+        return not is_over and self._host.ledger.holds_lease(self.job.id)
 
     def step(
         self, kind: str, values: Mapping[str, Any], report: Callable[[float], object] = lambda fraction: None
