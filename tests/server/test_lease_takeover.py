@@ -73,7 +73,7 @@ class Server:
 
 @pytest.fixture
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ledger]:
-    monkeypatch.setattr("relume_worker.jobs.job_service.HEARTBEAT_S", 2 * WAIT_S)  # a stalled server renews no lease
+    monkeypatch.setattr("relume_worker.jobs.job_service.RENEW_S", 2 * WAIT_S)  # a stalled server renews no lease
     with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as opened:
         yield opened
 

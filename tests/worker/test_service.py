@@ -5,6 +5,7 @@ import re
 import threading
 import time
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,16 +22,17 @@ from relume.core.errors import (
     NotFoundError,
     ParameterError,
 )
-from relume.store.bake_protocol import Task
+from relume.store.bake_protocol import Plan, Task
 from relume.store.reader import open_store
 from relume.store.run_bake import bake_in_process
 from relume_worker import lease, scenes
-from relume_worker.database.models import BakeRow
-from relume_worker.executor import Executors
+from relume_worker.bake_kind import START_S
+from relume_worker.database.models import JobRow
+from relume_worker.executor import TINY_BAKE_RAYS, Executors
 from relume_worker.ledger import Ledger
 from relume_worker.paths import staging_path
 from relume_worker.scenes import delete_bakes, delete_scene, register_scene
-from relume_worker.service import START_S, BakeService
+from relume_worker.service import BakeService
 from relume_worker.status import BakeStatus, TaskCost, bake_id
 from relume_worker.tasks import BakeInput, run_task
 
@@ -79,7 +81,7 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
 
 
 def test_duration_is_estimated_after_the_first_bake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("ledger", "service"):
+    for module in ("runner", "bake_kind"):
         monkeypatch.setattr(f"relume_worker.{module}.machine_load", lambda: 0.0)
     with open_service(tmp_path) as service:
         plan = service.plan(SCENE.id, RECIPE)
@@ -202,21 +204,23 @@ def test_failure_is_one_sentence_and_a_retry_finishes(
 def test_failing_lane_is_logged_once_while_the_other_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
-    tried = threading.Event()
-    with open_service(tmp_path) as service:
-        run_next = service._run_next
+    monkeypatch.setattr("relume_worker.jobs.job_service.POLL_INTERVAL_S", 0.02)
+    tried, tries = threading.Event(), []
+    service = open_service(tmp_path)
+    claim, large = service.ledger.claim, service.ledger.submit(SCENE.id, RECIPE, Plan(1, TINY_BAKE_RAYS + 1, 1, 1))
 
-        def fails(tiny: bool) -> bool:
-            if tiny:
-                return run_next(tiny)
-            tries.append(tiny)
-            if len(tries) > 5:
-                tried.set()
-            raise DiskFullError("the database")
+    def fails(identity: str) -> bool:
+        if identity != large:
+            return claim(identity)
+        tries.append(identity)
+        if len(tries) > 5:
+            tried.set()
+        raise DiskFullError("the database")
 
-        tries: list[bool] = []
-        monkeypatch.setattr(service, "_run_next", fails)
+    monkeypatch.setattr(service.ledger, "claim", fails)
+    with service:
+        small = service.submit(SCENE.id, type(RECIPE)("fake", ("front",), (8, 8), 3))
+        assert follow(service, small).state == "ready"
         assert tried.wait(60)
     assert caplog.text.count("trying again") == 1
     assert "resolved" not in caplog.text
@@ -225,7 +229,7 @@ def test_failing_lane_is_logged_once_while_the_other_continues(
 def test_bake_that_the_ledger_cannot_record_reports_why_it_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
+    monkeypatch.setattr("relume_worker.jobs.job_service.POLL_INTERVAL_S", 0.02)
     service, has_room = open_service(tmp_path), threading.Event()
     claim = service.ledger.claim
 
@@ -283,7 +287,7 @@ def test_process_start_is_part_of_the_estimate(tmp_path: Path, monkeypatch: pyte
         follow(service, service.submit(SCENE.id, RECIPE))
         plan = service.plan(SCENE.id, RECIPE)
         warm_s = service.estimate_seconds(plan)
-        monkeypatch.setattr("relume_worker.service.is_tiny", lambda plan: False)
+        monkeypatch.setattr("relume_worker.bake_kind.is_tiny", lambda plan: False)
         cold_s = service.estimate_seconds(plan)
         monkeypatch.setattr(Executors, "has_cluster", True)
         assert service.estimate_seconds(plan) == warm_s
@@ -379,7 +383,7 @@ def test_bake_taken_over_by_another_process_is_left_to_it(
     with open_service(tmp_path) as service:
         identity = service.submit(SCENE.id, RECIPE)
         assert has_begun.wait(30)
-        elsewhere = BakeRow.__table__.update().values(owner="elsewhere/1/nonce/0", heartbeat=time.time() + 600)
+        elsewhere = JobRow.__table__.update().values(owner="elsewhere/1/nonce/0", heartbeat=time.time() + 600)
         with service.ledger.sessions.begin() as session:
             session.execute(elsewhere)
         may_go_on.set()
@@ -400,7 +404,7 @@ def test_bake_deleted_at_the_end_of_a_task_is_not_a_failure(
     finish, deleted = Ledger.finish_task, threading.Event()
 
     def finish_deleted(ledger: Ledger, identity: str, *arguments: Any) -> bool:
-        ledger.delete_bakes([identity])
+        ledger.delete([identity])
         deleted.set()
         return finish(ledger, identity, *arguments)
 
@@ -479,10 +483,11 @@ def test_abandoned_stores_are_removed_at_start(tmp_path: Path, monkeypatch: pyte
 def test_published_store_of_a_killed_service_is_used_unchanged(tmp_path: Path) -> None:
     service = open_service(tmp_path)
     identity = service.submit(SCENE.id, RECIPE)
-    service.ledger.claim(identity, "elsewhere/1/nonce/0")
+    elsewhere = copy(service.ledger)
+    elsewhere.owner = "elsewhere/1/nonce/0"
+    assert elsewhere.claim(identity)
     bake_in_process(FakeMethod(), SCENE, RECIPE, service.store_path(identity))
-    service.ledger.renew_lease(identity, "elsewhere/1/nonce/0")
-    service.ledger._change(identity, None, heartbeat=time.time() - 2 * lease.LEASE_S)
+    assert elsewhere.update_leased(identity, heartbeat=time.time() - 2 * lease.LEASE_S)
     with service:
         assert follow(service, identity).state == "ready"
 
