@@ -58,7 +58,8 @@ class Server:
         self.quotas: list[str] = []
         self._outcome = outcome
         rows = JobLedger(ledger.sessions, Quota(9, 9), new_owner())
-        self.service = JobService(rows, self._run, lambda: 1, lambda error: make_problem(error).detail, {})
+        self.service = JobService(rows, {})
+        self.service.use_steps(self._run, lambda: 1, lambda error: make_problem(error).detail)
         self.jobs = BtfJobs(
             self.service, data, lambda job, *_: self.quotas.append(f"kept {job}"),
             lambda job: self.quotas.append(f"failed {job}"),

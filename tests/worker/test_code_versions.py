@@ -33,6 +33,7 @@ def running(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
             "relume.store.run_bake",
             "relume_worker.status",
             "relume_worker.ledger",
+            "relume_worker.bake_kind",
             "relume_worker.service",
             "relume_worker.tasks",
         ):

@@ -137,7 +137,7 @@ def test_owner_without_its_lease_records_and_deletes_nothing(
     assert "is taken over from" in caplog.text
     assert not first.renew_lease(identity)
     assert not first.finish_task(identity, Task(0, 2, "left", 8, 16), cost, 1)
-    assert not first.discard_tasks(identity)
+    assert not first.delete_tasks(identity, is_running=True)
     assert not first.restart(identity, "code", "run", None)
     assert not first.finish(identity, "failed", problem="a problem")
     assert not first.release(identity)

@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
+from sqlalchemy import update
 
 from relume.core.errors import (
     BudgetError,
@@ -29,6 +31,7 @@ from relume_worker import lease, scenes
 from relume_worker.bake_kind import START_S
 from relume_worker.database.models import JobRow
 from relume_worker.executor import TINY_BAKE_RAYS, Executors
+from relume_worker.jobs.job import UNREADABLE
 from relume_worker.ledger import Ledger
 from relume_worker.paths import staging_path
 from relume_worker.scenes import delete_bakes, delete_scene, register_scene
@@ -107,6 +110,60 @@ def test_canceled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path, 
         assert tree_hash(service.store_path(identity)) == expected
     assert sorted(log.read_text().split()) == sorted(set(log.read_text().split()))
     assert len(log.read_text().split()) == NUM_TASKS
+
+
+STAGES = {
+    "claimed": "relume_worker.bake_kind.BakeKind._expect_work",
+    "started": "relume_worker.runner.start_run",
+    "prepared": "relume_worker.runner.run_bake.create_stage",
+    "task done": "relume_worker.ledger.Ledger.finish_task",
+    "all tasks done": "relume_worker.runner.publish",
+    "published": "relume_worker.runner.delete_partial",
+}
+
+
+@pytest.mark.parametrize("stage", ["queued", *STAGES])
+def test_bake_is_canceled_at_any_stage_and_resumes(
+    tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    service = open_service(tmp_path)
+    identity = service.submit(SCENE.id, RECIPE)
+
+    def ended() -> bool:
+        return service.get(identity).state == "canceled" and not service.jobs._runs
+
+    def cancel_first(*arguments: Any, **options: Any) -> Any:
+        service.cancel(identity)
+        return call(*arguments, **options)
+
+    if stage == "queued":
+        service.cancel(identity)
+    else:
+        call = resolve_name(STAGES[stage])
+        monkeypatch.setattr(STAGES[stage], cancel_first)
+    with service:
+        deadline = time.monotonic() + 60
+        while not ended():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        monkeypatch.undo()
+        assert service.ledger.get("bake", identity).owner is None
+        service.submit(SCENE.id, RECIPE)
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_bake_with_a_damaged_recipe_fails_and_others_run(tmp_path: Path) -> None:
+    service = open_service(tmp_path)
+    damaged, intact = service.submit(SCENE.id, RECIPE), service.submit(SCENE.id, replace(RECIPE, num_lights=3))
+    with service.ledger.sessions.begin() as session:
+        session.execute(update(JobRow).where(JobRow.id == damaged).values(request="{"))
+    with service:
+        assert follow(service, intact).state == "ready"
+        assert [(bake.id, bake.state) for bake in service.bakes()] == [(intact, "ready"), (damaged, "failed")]
+        assert service.get(damaged).problem == UNREADABLE
+        assert service.submit(SCENE.id, RECIPE) == damaged
+        assert follow(service, damaged).state == "ready"
 
 
 def stop_half_way(service: BakeService) -> str:

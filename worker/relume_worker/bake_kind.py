@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from relume.core.errors import ParameterError
+from relume.core.errors import DiskFullError, ParameterError, RelumeError, bytes_text, is_disk_full
 from relume.core.folder_size import folder_bytes
 from relume.core.source_hash import bake_code
 from relume.store.bake_protocol import BakeMethod, Plan
@@ -20,7 +20,7 @@ from relume_worker.jobs.kind import Kind
 from relume_worker.ledger import Ledger
 from relume_worker.paths import staging_path
 from relume_worker.progress import ExpectedWork
-from relume_worker.runner import BakeRunner, error_text
+from relume_worker.runner import SCHEDULER_LOST_MESSAGE, BakeRunner
 from relume_worker.status import BakeStatus
 from relume_worker.status_bus import BlockedBake
 from relume_worker.tasks import BakeInput
@@ -92,13 +92,20 @@ class BakeKind(Kind):
                 self._start_s = runner.working_since - start_s
 
     def error_text(self, identity: str, error: Exception) -> str:
-        """Error and remedy."""
-
-        def missing_bytes() -> int:
-            planned_bytes = self._ledger.bake(identity).plan.planned_bytes
-            return planned_bytes - folder_bytes(staging_path(self._data_dir, identity))
-
-        return error_text(error, missing_bytes)
+        """Error and remedy, in one line."""
+        if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
+            written_bytes = folder_bytes(staging_path(self._data_dir, identity))
+            missing_bytes = max(1_000_000, self._ledger.bake(identity).plan.planned_bytes - written_bytes)
+            return f"disk full; free {bytes_text(missing_bytes)}, then bake again; finished tasks are saved"
+        if isinstance(error, RelumeError):
+            return " ".join(str(error).split())
+        if type(error).__name__ == "CommClosedError":  # the connection closed while submitting
+            return SCHEDULER_LOST_MESSAGE
+        if isinstance(error, MemoryError):
+            return "out of memory; give fewer lights or a smaller size, then bake again; finished tasks are saved"
+        if isinstance(error, OSError):
+            return f"a file cannot be read or written ({error.strerror}); fix this, then bake again"
+        return f"internal error: {type(error).__name__}: {str(error)[:200]}; the log has the traceback"
 
     def on_ready(self, identity: str) -> None:
         """Notify subscribers."""

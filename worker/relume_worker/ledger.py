@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from functools import lru_cache
@@ -16,19 +16,18 @@ from typing import Any, cast
 
 from sqlalchemy import Engine, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
-from sqlalchemy.orm import Session, sessionmaker
+from sqlalchemy.orm import sessionmaker
 
 from relume.core.errors import NotFoundError, RelumeError
 from relume.core.source_hash import bake_code
 from relume.store.bake_protocol import Plan, Recipe, Task
-from relume_worker.database.clock import epoch_s
 from relume_worker.database.models import JobRow, TaskRow
 from relume_worker.estimate import CompletedBake
 from relume_worker.executor import is_tiny
 from relume_worker.job_state import ACTIVE_STATES, JobState
 from relume_worker.jobs.fair_share import FairShare, Waiting
 from relume_worker.jobs.job import BAKE, UNREADABLE, Quota
-from relume_worker.jobs.job_ledger import JobLedger, num_changed, queue_again
+from relume_worker.jobs.job_ledger import JobLedger, queue_again
 from relume_worker.lease import new_owner
 from relume_worker.status import BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 
@@ -128,21 +127,12 @@ class Ledger(JobLedger):
             return {}
         columns = JobRow.id, JobRow.state, JobRow.client, JobRow.is_first, JobRow.queued
         query = select(*columns).where(JobRow.kind == BAKE, JobRow.state.in_(ACTIVE_STATES))
-        lanes: dict[bool, list[Any]] = {True: [], False: []}
+        lanes = defaultdict[bool, list[Waiting]](list)
         with self.sessions() as session:
             for row in session.execute(query):
-                lanes[bool(row.is_first)].append(row)
-        positions = dict[str, int]()
-        for is_first, active in lanes.items():
-            running = Counter(row.client or "" for row in active if row.state == "running")
-            waiting = [
-                Waiting(row.id, row.client or "", is_first, row.queued or 0.0, running[row.client or ""])
-                for row in active
-                if row.state == "queued"
-            ]
-            turns = FairShare({}).sort(waiting)
-            positions.update({work.id: number for number, work in enumerate(turns, running.total())})
-        return positions
+                work = Waiting(row.id, row.client or "", row.state == "running", row.queued or 0.0)
+                lanes[bool(row.is_first)].append(work)
+        return {work.id: k for lane in lanes.values() for k, work in enumerate(FairShare({}).sort(lane))}
 
     def finished_tasks(self, identity: str) -> dict[tuple[int, int], TaskCost]:
         """Costs of a bake's finished tasks by (stage, index)."""
@@ -167,23 +157,20 @@ class Ledger(JobLedger):
             session.merge(row)
         return True
 
-    def delete_tasks(self, identity: str) -> None:
-        """Delete the task rows of a bake that nobody runs, and whose unfinished store is missing or damaged."""
-        with self.sessions.begin() as session:
-            _delete_tasks(session, identity)
+    def delete_tasks(self, identity: str, *, is_running: bool = False) -> bool:
+        """Delete the task rows of a bake whose unfinished store is missing or damaged.
 
-    def discard_tasks(self, identity: str) -> bool:
-        """Delete the task rows of a bake whose lease is here. False if it is not: nothing is deleted."""
+        Args:
+            identity: id of the bake. is_running: whether it runs; then only the owner of its lease may do this.
+        Returns:
+            False if another owner has the lease: nothing is deleted.
+        """
         with self.sessions.begin() as session:
-            if not self._renew_until_commit(session, identity):
+            if is_running and not self._renew_until_commit(session, identity):
                 return False
-            _delete_tasks(session, identity)
+            session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
+            session.execute(update(JobRow).where(JobRow.id == identity).values(progress=0.0))
         return True
-
-    def _renew_until_commit(self, session: Session, identity: str) -> bool:
-        """Renew a lease; true if this owner holds it until the transaction ends."""
-        is_owner = JobRow.id == identity, JobRow.owner == self.owner
-        return num_changed(session, update(JobRow).where(*is_owner).values(heartbeat=epoch_s())) == 1
 
     def restart(self, identity: str, code: str, run: str, reason: str | None) -> bool:
         """Restart a bake from nothing, under this code.
@@ -194,7 +181,8 @@ class Ledger(JobLedger):
         Returns:
             False if another owner has the lease, or the bake was canceled.
         """
-        return self.discard_tasks(identity) and self.update_leased(identity, code=code, run=run, problem=reason)
+        is_deleted = self.delete_tasks(identity, is_running=True)
+        return is_deleted and self.update_leased(identity, code=code, run=run, problem=reason)
 
     def finished_bakes(self, limit: int) -> list[CompletedBake]:
         """Measured work of the newest ready bakes."""
@@ -236,11 +224,6 @@ class Ledger(JobLedger):
                     count, num_parallel[bake]
                 )
         return seconds_by_stage
-
-
-def _delete_tasks(session: Session, identity: str) -> None:
-    session.execute(delete(TaskRow).where(TaskRow.bake_id == identity))
-    session.execute(update(JobRow).where(JobRow.id == identity).values(progress=0.0))
 
 
 def _plan_json(plan: Plan) -> str:

@@ -19,15 +19,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from relume.core.errors import (
-    CancelledError,
-    ChunkDamagedError,
-    DiskFullError,
-    RelumeError,
-    StorageError,
-    bytes_text,
-    is_disk_full,
-)
+from relume.core.errors import CancelledError, ChunkDamagedError, RelumeError, StorageError
 from relume.core.filesystem import remove_folder
 from relume.core.folder_size import folder_bytes
 from relume.scene.model import Scene
@@ -137,7 +129,7 @@ class BakeRunner:
         try:
             return publish(staging, target, self._renew_lease)
         except ChunkDamagedError:
-            if self._call_ledger(self.ledger.discard_tasks, bake.bake_id):
+            if self._call_ledger(self.ledger.delete_tasks, bake.bake_id, is_running=True):
                 shutil.rmtree(staging, ignore_errors=True)
             raise
 
@@ -278,26 +270,6 @@ class BakeRunner:
     @property
     def _staging(self) -> Path:
         return staging_path(self.bake.data_dir, self.bake.bake_id)
-
-
-def error_text(error: Exception, missing_bytes: Callable[[], int]) -> str:
-    """Error and remedy, in one line.
-
-    Args:
-        error: exception of a run. missing_bytes: how many bytes the bake has yet to write.
-    """
-    if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
-        missing_text = bytes_text(max(1_000_000, missing_bytes()))
-        return f"disk full; free {missing_text}, then bake again; finished tasks are saved"
-    if isinstance(error, RelumeError):
-        return " ".join(str(error).split())
-    if type(error).__name__ == "CommClosedError":  # the connection closed while submitting
-        return SCHEDULER_LOST_MESSAGE
-    if isinstance(error, MemoryError):
-        return "out of memory; give fewer lights or a smaller size, then bake again; finished tasks are saved"
-    if isinstance(error, OSError):
-        return f"a file cannot be read or written ({error.strerror}); fix this, then bake again"
-    return f"internal error: {type(error).__name__}: {str(error)[:200]}; the log has the traceback"
 
 
 def is_lost_process(error: Exception) -> bool:

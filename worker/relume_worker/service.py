@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from relume.core.errors import NotFoundError, PlanError, StorageError
+from relume.core.errors import NotFoundError, StorageError
 from relume.core.source_hash import bake_code
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.reader import read_code
@@ -25,7 +24,6 @@ from relume_worker.executor import Executors, is_tiny
 from relume_worker.idle_timer import idle_seconds
 from relume_worker.jobs.job import BAKE
 from relume_worker.jobs.job_service import JobService
-from relume_worker.jobs.step import IsNeeded, ProgressCallback, Step
 from relume_worker.ledger import Ledger
 from relume_worker.paths import bake_path, scene_path
 from relume_worker.run_marker import delete_run, get_run
@@ -77,7 +75,7 @@ class BakeService:
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
         self.executors = Executors(scheduler, num_workers)
         self._status_bus = StatusBus(self.get)
-        self.jobs = JobService(self.ledger, _run_no_step, lambda: 0, str, client_weights or {})
+        self.jobs = JobService(self.ledger, client_weights or {})
         on_change, is_closing = self._status_bus.notify_change, lambda: self.jobs.is_closing
         self.kind = BakeKind(self.data_dir, self.ledger, self.executors, methods, on_change, is_closing)
         self.jobs.add_kind(self.kind)
@@ -160,7 +158,7 @@ class BakeService:
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake, whichever process runs it. Raises NotFoundError."""
-        return self._status_bus.subscribe(bake_id)
+        return Subscription(self._status_bus, bake_id)
 
     def cancel(self, bake_id: str) -> bool:
         """Cancel a bake; finished tasks are saved for a resume. False if it is neither queued nor running."""
@@ -251,10 +249,6 @@ class BakeService:
                 shutil.rmtree(folder, ignore_errors=True)
                 delete_note(folder)
                 delete_run(folder)
-
-
-def _run_no_step(step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
-    raise PlanError(f"the {step.kind} needs a server")  # the server has steps of its own
 
 
 def _age_s(folder: Path) -> float:

@@ -185,7 +185,13 @@ class JobLedger:
 
     def renew_lease(self, identity: str) -> bool:
         """Renew the lease of a job in any state. False if it is not here any more."""
-        return self._update(JobRow.id == identity, JobRow.owner == self.owner, heartbeat=epoch_s())
+        with self.sessions.begin() as session:
+            return self._renew_until_commit(session, identity)
+
+    def _renew_until_commit(self, session: Session, identity: str) -> bool:
+        """Renew a lease; true if this owner holds it until the transaction ends."""
+        is_owner = JobRow.id == identity, JobRow.owner == self.owner
+        return num_changed(session, update(JobRow).where(*is_owner).values(heartbeat=epoch_s())) == 1
 
     def finish(self, identity: str, state: JobState, **values: Any) -> bool:
         """Set the final state of an active job whose lease is here, and other columns. False if it is not any more."""

@@ -35,20 +35,15 @@ class JobService:
     """Runs jobs; several services may share a database and a data directory.
 
     Args:
-        ledger: of the jobs. run_step: runs a step in another process. num_slots: bulk steps that run at once.
-        describe: one sentence about an exception, for the job's row.
-        weights: of clients, see `FairShare`.
+        ledger: of the jobs. weights: of clients, see `FairShare`.
     """
 
-    def __init__(
-        self,
-        ledger: JobLedger,
-        run_step: RunStep,
-        num_slots: Callable[[], int],
-        describe: Callable[[Exception], str],
-        weights: Mapping[str, float],
-    ) -> None:
-        self.ledger, self.run_step, self.num_slots, self.describe = ledger, run_step, num_slots, describe
+    run_step: RunStep
+    num_slots: Callable[[], int]
+    describe: Callable[[Exception], str]
+
+    def __init__(self, ledger: JobLedger, weights: Mapping[str, float]) -> None:
+        self.ledger = ledger
         self._kinds: dict[str, Kind] = {}
         self._fair_shares = defaultdict[str, FairShare](lambda: FairShare(weights))  # by lane
         self._wake, self._closing, self._ended = threading.Event(), threading.Event(), threading.Event()
@@ -63,7 +58,12 @@ class JobService:
         self._kinds[kind.name] = kind
 
     def use_steps(self, run_step: RunStep, num_slots: Callable[[], int], describe: Callable[[Exception], str]) -> None:
-        """Replace what runs steps, before `start`; arguments as of the constructor."""
+        """Set what kinds with steps need, before `start`.
+
+        Args:
+            run_step: runs a step in another process. num_slots: number of bulk steps that run at once.
+            describe: returns one sentence about an exception, for the job's row.
+        """
         self.run_step, self.num_slots, self.describe = run_step, num_slots, describe
 
     def start(self) -> None:
