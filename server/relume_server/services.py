@@ -247,7 +247,7 @@ def _live(
 
 def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, drain: DrainState) -> None:
     """Register metrics of running and queued jobs, and of capacity."""
-    metrics.watch_workers(service.workers_resident_bytes)
+    metrics.watch_workers(service.executors.resident_bytes)
     metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions, ("render", "comparison", "btf")))
     metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.min_free_bytes)
 

@@ -5,6 +5,7 @@ import re
 import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -350,6 +351,22 @@ def test_process_start_is_part_of_the_estimate(tmp_path: Path, monkeypatch: pyte
         assert service.estimate_seconds(plan) == warm_s
     assert warm_s is not None
     assert cold_s == pytest.approx(warm_s + START_S)
+
+
+def test_worker_processes_are_not_idle_while_they_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    users: list[int] = []
+    service = open_service(tmp_path)
+
+    def cluster() -> ThreadPoolExecutor:
+        users.append(service.executors._num_users)
+        return threads
+
+    monkeypatch.setattr(service.executors, "cluster", cluster)
+    with ThreadPoolExecutor(1) as threads, service:
+        large = service.ledger.submit(SCENE.id, RECIPE, Plan(1, TINY_BAKE_RAYS + 1, 1, 1))
+        assert follow(service, large).state == "ready"
+    assert users == [1]
+    assert service.executors._num_users == 0
 
 
 def test_unknown_names_are_rejected(tmp_path: Path) -> None:

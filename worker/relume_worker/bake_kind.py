@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ class BakeKind(Kind):
             methods: available methods by name; None: relume's registry.
             on_change: called after every change of a bake. is_closing: polled; bakes stay `running` for the next start.
         """
-        self._data_dir, self._ledger, self._executors = data_dir, ledger, executors
+        self._data_dir, self._ledger, self.executors = data_dir, ledger, executors
         self._methods, self._on_change, self._is_closing = methods, on_change, is_closing
         self._is_crowding = threading.Event()
         self._start_s = START_S
@@ -63,33 +64,33 @@ class BakeKind(Kind):
         """Run the unfinished tasks of a bake, and publish it."""
         self.blocked.report_resumed(work.id)
         self._on_change()
-        status, start_s, is_cold = self._ledger.bake(work.id), time.monotonic(), not self._executors.has_cluster
+        status, start_s, is_cold = self._ledger.bake(work.id), time.monotonic(), not self.executors.has_cluster
         if status.problem == UNREADABLE:
             raise NotReadyError(UNREADABLE)
-        method, executors, tiny = self.method(status.recipe.method), self._executors, work.is_first
+        method, executors, tiny = self.method(status.recipe.method), self.executors, work.is_first
         expected_work = self._expect_work(status, 1 if tiny else executors.num_workers)
         if not tiny:
             self._ledger.update_leased(status.id, phase="starting", phase_since=time.time())
             self._on_change()
-        runner = BakeRunner(
-            ledger=self._ledger,
-            bake=BakeInput(self._data_dir, status.id, status.scene, status.recipe, method, bake_code()),
-            executor=executors.local() if tiny else executors.cluster(),
-            max_in_flight=(lambda: 1) if tiny else (lambda: 2 * executors.num_processes()),
-            on_change=self._on_change,
-            is_stopped=self._is_closing,
-            expected_work=expected_work,
-        )
-        if tiny:
-            return runner.run()
-        self._is_crowding.set()
-        try:
-            with executors.keep_cluster():
+        with nullcontext() if tiny else executors.keep_cluster():
+            runner = BakeRunner(
+                ledger=self._ledger,
+                bake=BakeInput(self._data_dir, status.id, status.scene, status.recipe, method, bake_code()),
+                executor=executors.local() if tiny else executors.cluster(),
+                max_in_flight=(lambda: 1) if tiny else (lambda: 2 * executors.num_processes()),
+                on_change=self._on_change,
+                is_stopped=self._is_closing,
+                expected_work=expected_work,
+            )
+            if tiny:
                 return runner.run()
-        finally:
-            self._is_crowding.clear()
-            if is_cold and runner.working_since is not None:
-                self._start_s = runner.working_since - start_s
+            self._is_crowding.set()
+            try:
+                return runner.run()
+            finally:
+                self._is_crowding.clear()
+                if is_cold and runner.working_since is not None:
+                    self._start_s = runner.working_since - start_s
 
     def error_text(self, identity: str, error: Exception) -> str:
         """Error and remedy, in one line."""
@@ -135,18 +136,18 @@ class BakeKind(Kind):
         Includes starting processes and loading kernels.
         """
         work_s = self._work_s(plan)
-        is_cold = not is_tiny(plan) and not self._executors.has_cluster
+        is_cold = not is_tiny(plan) and not self.executors.has_cluster
         return work_s if work_s is None or not is_cold else work_s + self._start_s
 
     def _work_s(self, plan: Plan) -> float | None:
         """Seconds from the start of the first task."""
-        num_workers, load = self._executors.num_workers, machine_load()
+        num_workers, load = self.executors.num_workers, machine_load()
         if is_tiny(plan) or not self._is_crowding.is_set():  # a bake that ends before this one would count twice
             load += num_workers
         return estimate_seconds(plan, self._ledger.finished_bakes(NUM_REFERENCE_BAKES), num_workers, crowding(load))
 
     def _expect_work(self, status: BakeStatus, parallel: int) -> ExpectedWork:
-        method, num_workers = self.method(status.recipe.method), self._executors.num_workers
+        method, num_workers = self.method(status.recipe.method), self.executors.num_workers
         seconds = self._ledger.stage_seconds(status.scene, method.name, num_workers, NUM_REFERENCE_BAKES)
         total, stages = sum(seconds.values()), range(len(method.stages))
         stage_fractions = [seconds.get(stage, 0.0) / total for stage in stages] if total else None

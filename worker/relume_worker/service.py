@@ -183,10 +183,6 @@ class BakeService:
         """Estimate the seconds of a bake from finished bakes, with the start of processes; None if there are none."""
         return self.kind.estimate_seconds(plan)
 
-    def workers_resident_bytes(self) -> int:
-        """Resident memory of this service's worker processes, in bytes."""
-        return self.executors.resident_bytes()
-
     def _resolve_scene_id(self, scene_id: str) -> str:
         from relume_worker.scenes import get_scene
 

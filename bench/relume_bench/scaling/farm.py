@@ -97,7 +97,7 @@ def run(plan: FarmPlan) -> dict[str, Any]:
         for number in range(plan.num_machines):
             folder = Path(plan.folder) / ("" if plan.is_shared else f"machine{number}")
             service = BakeService(folder, plan.ledger, methods={"direct": method})
-            service.executors = ThreadExecutors(1)
+            service.executors = service.kind.executors = ThreadExecutors(1)
             claims.watch(service)
             machines.append(service)
         first = machines[0]

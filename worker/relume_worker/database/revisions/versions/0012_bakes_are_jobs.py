@@ -12,20 +12,12 @@ revision = "0012"
 down_revision = "0011"
 is_additive = True  # no release has the former table
 
-_INTEGER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
+_NUMBERS = ("queued", "phase_since", "seconds_left", "progress", "rays_per_second", "crowding")
 _COLUMNS: dict[str, sa.types.TypeEngine[Any]] = {
-    "queued": sa.Double(),
-    "scene_id": sa.String(),
+    **dict.fromkeys(_NUMBERS, sa.Double()),
+    **dict.fromkeys(("scene_id", "phase", "code", "run"), sa.String()),
     "plan": sa.Text(),
-    "progress": sa.Double(),
-    "phase": sa.String(),
-    "phase_since": sa.Double(),
-    "rays_per_second": sa.Double(),
-    "seconds_left": sa.Double(),
-    "bytes": _INTEGER,
-    "code": sa.String(),
-    "run": sa.String(),
-    "crowding": sa.Double(),
+    "bytes": sa.BigInteger().with_variant(sa.Integer(), "sqlite"),
 }
 _KEPT = ("id", "state", "problem", "created", "client", "owner", "heartbeat", *_COLUMNS)
 
