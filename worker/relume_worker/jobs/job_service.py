@@ -80,6 +80,8 @@ class JobService:
             if thread.is_alive():
                 thread.join(max(0.0, deadline - time.monotonic()))
         self._ended.set()
+        if self._renewer.is_alive():
+            self._renewer.join(1.0)
 
     @property
     def is_closing(self) -> bool:
