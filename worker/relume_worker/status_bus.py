@@ -116,10 +116,6 @@ class BlockedBake:
     def __init__(self) -> None:
         self._blocked: dict[str, tuple[float, str]] = {}
 
-    def __bool__(self) -> bool:
-        """True if any bake is blocked."""
-        return bool(self._blocked)
-
     def report_blocked(self, status: BakeStatus, error: Exception) -> None:
         """Record that a bake could not be claimed, or could not continue."""
         if isinstance(error, DiskFullError):

@@ -1,4 +1,4 @@
-"""What the service of jobs needs of a kind of jobs."""
+"""Interface of a kind of jobs to the service that runs them."""
 
 from __future__ import annotations
 
