@@ -59,7 +59,8 @@ def _batch_s(service: BakeService, bake: str, view: str, frames: int) -> float:
     process = ProcessSettings(str(service.data_dir), 1 << 29, (), 1 << 30, 60)
     with closing(ClusterSteps(service.executors, process, {})) as steps:
         ledger = JobLedger(service.ledger.sessions, Quota(99, 99), new_owner())
-        jobs = JobService(ledger, steps.run, steps.num_slots, str, {})
+        jobs = JobService(ledger, {})
+        jobs.use_steps(steps.run, steps.num_slots, str)
         renders = RenderJobs(jobs, service.data_dir, lambda bake: "bench", lambda job, num_bytes: None)
         with closing(jobs):
             jobs.start()

@@ -48,10 +48,8 @@ from relume_server.settings import Settings
 from relume_server.telemetry.metrics import Metrics
 from relume_server.telemetry.traces import Traces, open_traces
 from relume_worker.jobs.job import Quota
-from relume_worker.jobs.job_ledger import JobLedger, count_jobs
-from relume_worker.jobs.job_service import JobService
+from relume_worker.jobs.job_ledger import count_jobs
 from relume_worker.jobs.step import StepExecutor
-from relume_worker.lease import new_owner
 from relume_worker.scenes import get_scene
 from relume_worker.service import BakeService
 from relume_worker.tasks import cached_bytes
@@ -153,12 +151,10 @@ async def open_services(
         cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes)
         _watch_memory(metrics, library, transfers)
         _watch_jobs(metrics, settings, service, drain)
-        await asyncio.to_thread(service.start)
-        jobs = _open_jobs(settings, service, executor)
-        kinds = _open_kinds(settings, jobs, service, access)
+        kinds = _open_kinds(settings, service, executor, access)
         at_end(kinds.comparisons.close)
-        at_end(jobs.close)
-        jobs.start()
+        at_end(service.jobs.close)
+        await asyncio.to_thread(service.start)
         prewarmer = Prewarmer(settings.data, service.ledger, executor.run, thumbnails, transfers.is_used)
         at_end(prewarmer.close)
         if settings.prewarm:
@@ -198,16 +194,6 @@ async def open_services(
         )
 
 
-def _open_jobs(settings: Settings, service: BakeService, executor: StepExecutor) -> JobService:
-    quota = Quota(settings.max_queued, settings.max_queued_per_client)
-    ledger = JobLedger(service.ledger.sessions, quota, new_owner())
-
-    def error_text(error: Exception) -> str:
-        return make_problem(error).detail
-
-    return JobService(ledger, executor.run, executor.num_slots, error_text, settings.fair_shares)
-
-
 class _Kinds(NamedTuple):
     """Kinds of jobs."""
 
@@ -216,7 +202,12 @@ class _Kinds(NamedTuple):
     btfs: BtfJobs
 
 
-def _open_kinds(settings: Settings, jobs: JobService, service: BakeService, access: AuthServices) -> _Kinds:
+def _open_kinds(settings: Settings, service: BakeService, executor: StepExecutor, access: AuthServices) -> _Kinds:
+    """Add the server's kinds of jobs to the service that runs the bakes."""
+    jobs = service.jobs
+    jobs.use_steps(executor.run, executor.num_slots, lambda error: make_problem(error).detail)
+    service.ledger.quota = Quota(settings.max_queued, settings.max_queued_per_client)
+
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
@@ -256,7 +247,7 @@ def _live(
 
 def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, drain: DrainState) -> None:
     """Register metrics of running and queued jobs, and of capacity."""
-    metrics.watch_workers(service.workers_resident_bytes)
+    metrics.watch_workers(service.executors.resident_bytes)
     metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions, ("render", "comparison", "btf")))
     metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.min_free_bytes)
 

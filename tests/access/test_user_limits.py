@@ -19,7 +19,8 @@ from relume_server.auth.audit import Audit, Change
 from relume_server.auth.rate_limit import TokenBuckets
 from relume_server.auth.services import AuthServices
 from relume_server.settings import Settings
-from relume_worker.database.models import BakeRow
+from relume_worker.database.models import JobRow
+from relume_worker.jobs.fair_share import Waiting
 from relume_worker.jobs.job import BusyError
 from relume_worker.service import BakeService
 
@@ -113,7 +114,7 @@ class TestBytes:
         for state, used in (("canceled", 250), ("failed", 250), ("queued", 1_000), ("ready", 77)):
             with client.app.state.services.bakes.ledger.sessions.begin() as session:  # type: ignore[attr-defined]
                 changed = {"state": state, "progress": 0.25, "bytes": 77}
-                session.execute(update(BakeRow).where(BakeRow.id == baked.bake).values(changed))
+                session.execute(update(JobRow).where(JobRow.id == baked.bake).values(changed))
             assert access.quotas.used_bytes("Ann") == used
 
     def test_unfinished_renders_count_with_their_upper_bound(
@@ -198,9 +199,14 @@ class TestFairScheduling:
     ) -> None:
         bakes: BakeService = client.app.state.services.bakes
         order: list[str] = []
-        monkeypatch.setattr(bakes, "_run", lambda status, tiny: order.append(names.get(status.id, "")))
+
+        def perform(work: Waiting) -> dict[str, float]:
+            order.append(names.get(work.id, ""))
+            return {}
+
+        monkeypatch.setattr(bakes.kind, "perform", perform)
         claimable = bakes.ledger.claimable
-        monkeypatch.setattr(bakes.ledger, "claimable", lambda: [])
+        monkeypatch.setattr(bakes.ledger, "claimable", lambda kinds, running: [])
         names: dict[str, str] = {}
         for k, name in enumerate(["Ann"] * 4 + ["Bob"] * 2 + ["Cem"] * 4):
             names[bakes.submit(baked.scene, Recipe("direct", ("front",), SIZE, 11 + k), name)] = name

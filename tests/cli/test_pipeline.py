@@ -151,7 +151,7 @@ def test_followers_of_a_bake_learn_that_it_is_deleted(tmp_path: Path) -> None:
         scene = register_scene(tmp_path, service.ledger, still_life())
         bake = service.submit(scene, Recipe("direct", ("front",), (16, 16), 50))
         with service.subscribe(bake) as changes:
-            service.ledger.delete_bakes([bake])
+            service.ledger.delete([bake])
             with pytest.raises(NotFoundError, match=f"bake {bake} was deleted"):
                 follow(changes, "still life")
 

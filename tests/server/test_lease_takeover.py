@@ -58,7 +58,8 @@ class Server:
         self.quotas: list[str] = []
         self._outcome = outcome
         rows = JobLedger(ledger.sessions, Quota(9, 9), new_owner())
-        self.service = JobService(rows, self._run, lambda: 1, lambda error: make_problem(error).detail, {})
+        self.service = JobService(rows, {})
+        self.service.use_steps(self._run, lambda: 1, lambda error: make_problem(error).detail)
         self.jobs = BtfJobs(
             self.service, data, lambda job, *_: self.quotas.append(f"kept {job}"),
             lambda job: self.quotas.append(f"failed {job}"),
@@ -73,7 +74,7 @@ class Server:
 
 @pytest.fixture
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ledger]:
-    monkeypatch.setattr("relume_worker.jobs.job_service.HEARTBEAT_S", 2 * WAIT_S)  # a stalled server renews no lease
+    monkeypatch.setattr("relume_worker.jobs.job_service.RENEW_S", 2 * WAIT_S)  # a stalled server renews no lease
     with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as opened:
         yield opened
 

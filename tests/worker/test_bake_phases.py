@@ -24,14 +24,14 @@ LARGE = TINY_BAKE_RAYS + 1
 def entered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Each phase recorded in the ledger, in order, once each."""
     phases: list[str] = []
-    beat = Ledger.heartbeat
+    update = Ledger.update_leased
 
-    def record(self: Ledger, identity: str, owner: str, **progress: Any) -> bool:
-        if not phases or phases[-1] != progress["phase"]:
-            phases.append(progress["phase"])
-        return beat(self, identity, owner, **progress)
+    def record(self: Ledger, identity: str, **columns: Any) -> bool:
+        if (phase := columns.get("phase")) is not None and phases[-1:] != [phase]:
+            phases.append(phase)
+        return update(self, identity, **columns)
 
-    monkeypatch.setattr(Ledger, "heartbeat", record)
+    monkeypatch.setattr(Ledger, "update_leased", record)
     return phases
 
 
@@ -60,7 +60,7 @@ def test_queue_position_of_a_bake(tmp_path: Path) -> None:
     ids = [service.ledger.submit(tiny_scene().id, *arguments) for arguments in zip(recipes, plans, strict=True)]
     assert [service.get(identity).queue_position for identity in ids] == [0, 0, 1, 2]
     assert {status.id: status.queue_position for status in service.bakes()} == dict(zip(ids, [0, 0, 1, 2], strict=True))
-    service.ledger.claim(ids[0], "host/1/nonce/1")
+    service.ledger.claim(ids[0])
     service.cancel(ids[2])
     assert [service.get(identity).queue_position for identity in ids] == [0, 0, 0, 1]
     service.close()
@@ -113,10 +113,10 @@ def test_stage_times_come_from_bakes_of_the_same_scene_if_there_are_any(tmp_path
     for scene, seconds in zip(scenes[:2], (3.0, 5.0), strict=True):
         register_scene(service.data_dir, service.ledger, scene)
         identity = service.ledger.submit(scene.id, RECIPE, Plan(1, LARGE, 1, 1))
-        service.ledger.claim(identity, "host/1/nonce/1")
+        service.ledger.claim(identity)
         for task in (Task(0, 0, "front", 0, 1), Task(1, 0, "front", 0, 1), Task(1, 1, "front", 1, 2)):
-            service.ledger.finish_task(identity, "host/1/nonce/1", task, TaskCost(1, seconds, seconds), 1)
-        service.ledger.finish(identity, "host/1/nonce/1", "ready")
+            service.ledger.finish_task(identity, task, TaskCost(1, seconds, seconds), 1)
+        service.ledger.finish(identity, "ready")
     stage_seconds = [service.ledger.stage_seconds(scene.id, "fake", 2, 8) for scene in scenes]
     assert stage_seconds == [{0: 3.0, 1: 3.0}, {0: 5.0, 1: 5.0}, {0: 8.0, 1: 8.0}]
     assert service.ledger.stage_seconds(scenes[0].id, "other", 2, 8) == {}

@@ -33,6 +33,7 @@ def running(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
             "relume.store.run_bake",
             "relume_worker.status",
             "relume_worker.ledger",
+            "relume_worker.bake_kind",
             "relume_worker.service",
             "relume_worker.tasks",
         ):
@@ -100,7 +101,7 @@ def test_partial_bake_of_other_code_restarts_with_a_reason(
     if how == "canceled":
         service._delete_orphans()
         assert not staging_path(tmp_path, identity).exists()
-        service.ledger.requeue(identity, ("canceled",))
+        service.ledger.requeue_bake(identity, ("canceled",))
     with service.subscribe(identity) as changes, service:
         statuses = list(changes)
         assert [statuses[-1].state, statuses[-1].problem, statuses[-1].code] == ["ready", None, NEW]

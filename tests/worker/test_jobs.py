@@ -170,7 +170,8 @@ class Jobs:
 
     def __init__(self, ledger: Ledger, folder: Path, machine: Machine, num_slots: int = 1, quota: int = 99) -> None:
         rows = JobLedger(ledger.sessions, Quota(quota, quota - 1), new_owner())
-        self.service = JobService(rows, machine.run, lambda: num_slots, str, {})
+        self.service = JobService(rows, {})
+        self.service.use_steps(machine.run, lambda: num_slots, str)
         self.frames = FrameJobs(self.service, folder)
 
     def submit(self, name: str, client: str = "", num: int = 2) -> str:

@@ -5,17 +5,20 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
+from copy import copy
 from pathlib import Path
 
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
-from sqlalchemy import text
+from sqlalchemy import text, update
 
 from relume.core.errors import NotFoundError
 from relume.store.bake_protocol import Recipe, Task
 from relume_server.persistence.leases import RoomLeases
 from relume_worker import lease
 from relume_worker.database import open_database
+from relume_worker.database.models import JobRow
+from relume_worker.jobs.job import BAKE, UNREADABLE
 from relume_worker.ledger import Ledger
 from relume_worker.scenes import delete_scene, get_scene, list_scenes, register_scene
 from relume_worker.status import TaskCost, bake_id, recipe_from_json, recipe_json
@@ -29,6 +32,13 @@ def ledger(tmp_path: Path, ledger_url: str) -> Iterator[Ledger]:
     with closing(Ledger(open_database(ledger_url))) as ledger:
         register_scene(tmp_path, ledger, SCENE)
         yield ledger
+
+
+def another(ledger: Ledger) -> Ledger:
+    """Ledger of another service on the same database."""
+    other = copy(ledger)
+    other.owner = lease.new_owner()
+    return other
 
 
 def test_recipe_survives_json_and_names_the_bake() -> None:
@@ -68,9 +78,9 @@ def test_only_one_of_many_claims_a_bake(ledger: Ledger) -> None:
     identity, won = ledger.submit(SCENE.id, RECIPE, PLAN), []
 
     def claim() -> None:
-        owner = lease.new_owner()
-        if ledger.claim(identity, owner):
-            won.append(owner)
+        service = another(ledger)
+        if service.claim(identity):
+            won.append(service)
 
     threads = [threading.Thread(target=claim) for _ in range(8)]
     for thread in threads:
@@ -78,21 +88,21 @@ def test_only_one_of_many_claims_a_bake(ledger: Ledger) -> None:
     for thread in threads:
         thread.join()
     assert len(won) == 1
-    assert ledger.claimable() == []
-    assert ledger.heartbeat(identity, won[0], progress=0.5)
-    assert not ledger.heartbeat(identity, lease.new_owner(), progress=0.9)
+    assert ledger.claimable([BAKE]) == []
+    assert won[0].update_leased(identity, progress=0.5)
+    assert not ledger.update_leased(identity, progress=0.9)
     assert ledger.bake(identity).progress == 0.5
 
 
 def test_lease_expires_without_renewal(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
-    identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
-    assert ledger.claim(identity, first)
+    identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), another(ledger), another(ledger)
+    assert first.claim(identity)
     monkeypatch.setattr(lease, "LEASE_S", -1.0)
-    assert [work.id for work in ledger.claimable()] == [identity]
-    assert ledger.claim(identity, second)
+    assert [work.id for work in ledger.claimable([BAKE])] == [identity]
+    assert second.claim(identity)
     monkeypatch.undo()
-    assert not ledger.heartbeat(identity, first)
-    ledger.finish(identity, first, "failed", "too late")
+    assert not first.update_leased(identity, progress=0.9)
+    assert not first.finish(identity, "failed", problem="too late")
     assert ledger.bake(identity).state == "running"
 
 
@@ -118,31 +128,34 @@ def test_machines_are_distinguished_by_more_than_a_host_name(monkeypatch: pytest
 def test_owner_without_its_lease_records_and_deletes_nothing(
     ledger: Ledger, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
+    identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), another(ledger), another(ledger)
     task, cost = Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2)
-    ledger.claim(identity, first)
-    assert ledger.finish_task(identity, first, task, cost, 1)
+    first.claim(identity)
+    assert first.finish_task(identity, task, cost, 1)
     monkeypatch.setattr(lease, "LEASE_S", -1.0)
-    assert ledger.claim(identity, second)
+    assert second.claim(identity)
     assert "is taken over from" in caplog.text
-    assert not ledger.renew_lease(identity, first)
-    assert not ledger.finish_task(identity, first, Task(0, 2, "left", 8, 16), cost, 1)
-    assert not ledger.delete_tasks(identity, first)
-    assert not ledger.restart(identity, first, "code", "run", None)
-    assert not ledger.finish(identity, first, "failed", "a problem")
+    assert not first.renew_lease(identity)
+    assert not first.finish_task(identity, Task(0, 2, "left", 8, 16), cost, 1)
+    assert not first.delete_tasks(identity, is_running=True)
+    assert not first.restart(identity, "code", "run", None)
+    assert not first.finish(identity, "failed", problem="a problem")
+    assert not first.release(identity)
     assert ledger.finished_tasks(identity) == {(0, 1): cost}
     status = ledger.bake(identity)
     assert (status.state, status.problem) == ("running", None)
-    assert ledger.finish(identity, second, "ready")
+    assert second.finish(identity, "ready")
+    assert second.release(identity)
 
 
 def test_canceled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) -> None:
-    identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
-    ledger.claim(identity, owner)
-    assert ledger.finish_task(identity, owner, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
+    identity = ledger.submit(SCENE.id, RECIPE, PLAN)
+    ledger.claim(identity)
+    assert ledger.finish_task(identity, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
     assert ledger.cancel(identity)
-    assert not ledger.heartbeat(identity, owner)
-    ledger.finish(identity, owner, "ready")
+    assert not ledger.update_leased(identity, progress=0.5)
+    assert not ledger.finish(identity, "ready")
+    assert ledger.release(identity)
     assert ledger.bake(identity).state == "canceled"
     assert ledger.submit(SCENE.id, RECIPE, PLAN) == identity
     assert ledger.bake(identity).state == "queued"
@@ -150,13 +163,33 @@ def test_canceled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) -
 
 
 def test_finished_bake_cannot_be_canceled_and_stays_ready(ledger: Ledger) -> None:
-    identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
-    ledger.claim(identity, owner)
-    ledger.finish(identity, owner, "ready", num_bytes=77)
+    identity = ledger.submit(SCENE.id, RECIPE, PLAN)
+    ledger.claim(identity)
+    ledger.finish(identity, "ready", bytes=77, progress=1.0)
     assert not ledger.cancel(identity)
     ledger.submit(SCENE.id, RECIPE, PLAN)
     status = ledger.bake(identity)
     assert (status.state, status.bytes, status.progress) == ("ready", 77, 1.0)
+
+
+@pytest.mark.parametrize("column", ["request", "plan"])
+@pytest.mark.parametrize("state", ["queued", "ready"])
+def test_bake_with_a_damaged_row_has_failed_until_it_is_requested_again(
+    ledger: Ledger, column: str, state: str
+) -> None:
+    damaged, other = ledger.submit(SCENE.id, RECIPE, PLAN), Recipe("fake", ("front",), (8, 8), 3)
+    intact = ledger.submit(SCENE.id, other, PLAN)
+    with ledger.sessions.begin() as session:
+        values = {column: '{"method": "fake"}', "state": state}
+        session.execute(update(JobRow).where(JobRow.id == damaged).values(values))
+    statuses = {status.id: (status.state, status.problem) for status in ledger.bakes()}
+    assert statuses == {damaged: ("failed", UNREADABLE), intact: ("queued", None)}
+    assert ledger.bake(damaged) in ledger.bakes_of_scenes([SCENE.id])[SCENE.id]
+    assert {work.id for work in ledger.claimable([BAKE])} >= {intact}
+    assert ledger.finished_bakes(8) == []
+    assert ledger.cancel(damaged) == (state == "queued")
+    assert ledger.submit(SCENE.id, RECIPE, PLAN) == damaged
+    assert (ledger.bake(damaged).state, ledger.bake(damaged).recipe) == ("queued", RECIPE)
 
 
 def test_scenes_are_listed_and_deleted_with_their_bakes(tmp_path: Path, ledger: Ledger) -> None:
@@ -166,9 +199,9 @@ def test_scenes_are_listed_and_deleted_with_their_bakes(tmp_path: Path, ledger: 
     record = get_scene(ledger, SCENE.id)
     assert (record.name, record.views, record.num_triangles) == ("triangle", ("front", "left"), 1)
     assert record.materials[0]["terms"][0]["model"] == "lambert"
-    identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
-    ledger.claim(identity, owner)
-    assert ledger.finish_task(identity, owner, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
+    identity = ledger.submit(SCENE.id, RECIPE, PLAN)
+    ledger.claim(identity)
+    assert ledger.finish_task(identity, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
     delete_scene(tmp_path, ledger, SCENE.id)
     assert [record.id for record in list_scenes(ledger)] == [other]
     assert ledger.bakes() == []

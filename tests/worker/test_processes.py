@@ -146,13 +146,13 @@ def test_idle_workers_exit_and_new_ones_start_for_the_next_bake(
         for size in (RECIPE.size, (16, 16)):
             identity = service.submit(tiny_scene().id, replace(RECIPE, size=size))
             with service.subscribe(identity) as changes:
-                resident = [service.workers_resident_bytes() for _ in changes]
+                resident = [service.executors.resident_bytes() for _ in changes]
             assert service.get(identity).state == "ready"
             assert max(resident) > 50e6
             deadline = time.monotonic() + 60
-            while service.workers_resident_bytes() and time.monotonic() < deadline:
+            while service.executors.resident_bytes() and time.monotonic() < deadline:
                 time.sleep(0.1)
-            assert service.workers_resident_bytes() == 0
+            assert service.executors.resident_bytes() == 0
         assert tree_hash(service.store_path(IDENTITY)) == expected
 
 

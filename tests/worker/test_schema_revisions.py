@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -15,9 +17,10 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import Engine, inspect, select, text
-from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from relume.core.errors import LedgerVersionError, ParameterError
+from relume.store.bake_protocol import Task
 from relume_server.auth.tables import AuditRow, OwnedRow, TokenRow
 from relume_server.persistence.look_store import LookStore
 from relume_server.persistence.share_store import ShareStore
@@ -27,17 +30,20 @@ from relume_server.persistence.tables import (
     RoomRow,
     ShareRow,
 )
+from relume_worker import lease
 from relume_worker.cameras import list_cameras
 from relume_worker.database import open_database, upgrading
 from relume_worker.database.connect import connect
 from relume_worker.database.models import Base, JobRow
 from relume_worker.database.upgrading import draft_revision, get_revision, latest_revision, upgrade
+from relume_worker.lease import new_owner
 from relume_worker.ledger import Ledger
 from relume_worker.scenes import list_scenes
+from relume_worker.status import TaskCost
 
 BEFORE = Path(__file__).with_name("before_revisions.sql").read_text(encoding="utf-8")
 TABLES = (LookRow, ShareRow, CommentRow, RoomRow, TokenRow, OwnedRow, AuditRow)
-JOB_TABLES = ("renders", "truths", "btfs")
+JOB_TABLES = ("bakes", "renders", "truths", "btfs")
 
 
 @pytest.fixture
@@ -86,7 +92,7 @@ def test_revisions_produce_the_tables_of_the_code(ledger_url: str) -> None:
 def test_ledger_from_before_revisions_is_upgraded_with_its_rows(old_ledger: Path) -> None:
     before = connect(f"sqlite:///{old_ledger}")
     assert revision(before) is None
-    old_rows = rows(before)
+    old_rows, old_columns = rows(before), [column["name"] for column in inspect(before).get_columns("bakes")]
     before.dispose()
     with closing(Ledger(engine := open_database(f"sqlite:///{old_ledger}"))) as ledger:
         assert (revision(engine), differences(engine)) == (latest_revision(), [])
@@ -102,7 +108,57 @@ def test_ledger_from_before_revisions_is_upgraded_with_its_rows(old_ledger: Path
         assert ShareStore(ledger.sessions).get("0123456789").document == {"bake": "x"}
         with ledger.sessions() as session:
             states = {job.kind: job.state for job in session.scalars(select(JobRow))}
-        assert states == {"render": "ready", "btf": "failed", "comparison": "queued"}
+        assert states == {"bake": "ready", "render": "ready", "btf": "failed", "comparison": "queued"}
+        values = dict(zip(old_columns, old_rows["bakes"][0], strict=True))
+        row = {"request": values.pop("recipe"), "kind": "bake", **values}
+        with engine.connect() as connection:
+            (job,) = connection.execute(text("SELECT * FROM jobs WHERE kind = 'bake'")).mappings()
+        assert {name: job[name] for name in row} == row
+
+
+PLAN = {"num_view_samples": 1, "num_rays": 10**9, "store_bytes": 1, "peak_bytes": 1}
+RECIPE = {"method": "fake", "views": ["front"], "size": [8, 8], "num_lights": 3, "relightable": False}
+
+
+def test_upgrade_keeps_waiting_and_running_bakes(ledger_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plans = {"large": PLAN, "small": {**PLAN, "work_s": 1.0}, "running": PLAN, "stopped": PLAN}
+    states = {"running": "running", "stopped": "canceled"}
+    with (before := connect(ledger_url)).begin() as connection:
+        config = upgrading._config()
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0011")
+        connection.execute(text("INSERT INTO scenes VALUES ('s', 'triangle', 0, '{}')"))
+        for number, (name, plan) in enumerate(plans.items()):
+            values = {
+                "id": name, "scene_id": "s", "recipe": json.dumps(RECIPE), "plan": json.dumps(plan), "client": "Ann",
+                "state": states.get(name, "queued"), "created": 9.0 - number, "queued": float(number), "progress": 0.5,
+                "bytes": 0, "run": "r", "heartbeat": time.time(), "owner": None,
+            }  # fmt: skip
+            if name == "running":
+                values["owner"] = "elsewhere/1/nonce/0"
+            columns = ", ".join(f'"{column}"' for column in values)
+            parameters = ", ".join(f":{column}" for column in values)
+            connection.execute(text(f"INSERT INTO bakes ({columns}) VALUES ({parameters})"), values)
+        connection.execute(text("INSERT INTO tasks VALUES ('running', 0, 1, 1, 5, 0.1, 0.2)"))
+    before.dispose()
+    with closing(Ledger(engine := open_database(ledger_url))) as ledger:
+        assert (revision(engine), differences(engine)) == (latest_revision(), [])
+        assert {bake.id: bake.state for bake in ledger.bakes("s")} == {"large": "queued", "small": "queued", **states}
+        waiting = [(work.id, work.is_first, work.created, work.num_elsewhere) for work in ledger.claimable(["bake"])]
+        assert sorted(waiting) == [("large", False, 0.0, 1), ("small", True, 1.0, 0)]
+        assert ledger.get("bake", "running").run == "r"
+        ledger.owner = "elsewhere/1/nonce/0"  # it was upgraded while it ran
+        assert ledger.finish_task("running", Task(0, 2, "left", 8, 16), TaskCost(5, 0.1, 0.2), 1)
+        assert ledger.finished_tasks("running").keys() == {(0, 1), (0, 2)}
+        ledger.owner = new_owner()
+        monkeypatch.setattr(lease, "LEASE_S", -1.0)
+        assert ledger.claim("running")
+        with pytest.raises(IntegrityError), engine.begin() as connection:
+            connection.execute(text("DELETE FROM scenes"))
+        with pytest.raises(IntegrityError), engine.begin() as connection:
+            connection.execute(text("DELETE FROM jobs WHERE id = 'running'"))
+        ledger.delete(list(plans))
+        assert ledger.bakes() == []
 
 
 def test_older_ledgers_get_missing_columns_and_tables(old_ledger: Path) -> None:

@@ -5,13 +5,17 @@ import re
 import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
+from sqlalchemy import update
 
 from relume.core.errors import (
     BudgetError,
@@ -21,16 +25,18 @@ from relume.core.errors import (
     NotFoundError,
     ParameterError,
 )
-from relume.store.bake_protocol import Task
+from relume.store.bake_protocol import Plan, Task
 from relume.store.reader import open_store
 from relume.store.run_bake import bake_in_process
 from relume_worker import lease, scenes
-from relume_worker.database.models import BakeRow
-from relume_worker.executor import Executors
+from relume_worker.bake_kind import START_S
+from relume_worker.database.models import JobRow
+from relume_worker.executor import TINY_BAKE_RAYS, Executors
+from relume_worker.jobs.job import UNREADABLE
 from relume_worker.ledger import Ledger
 from relume_worker.paths import staging_path
 from relume_worker.scenes import delete_bakes, delete_scene, register_scene
-from relume_worker.service import START_S, BakeService
+from relume_worker.service import BakeService
 from relume_worker.status import BakeStatus, TaskCost, bake_id
 from relume_worker.tasks import BakeInput, run_task
 
@@ -79,7 +85,7 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
 
 
 def test_duration_is_estimated_after_the_first_bake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("ledger", "service"):
+    for module in ("runner", "bake_kind"):
         monkeypatch.setattr(f"relume_worker.{module}.machine_load", lambda: 0.0)
     with open_service(tmp_path) as service:
         plan = service.plan(SCENE.id, RECIPE)
@@ -105,6 +111,60 @@ def test_canceled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path, 
         assert tree_hash(service.store_path(identity)) == expected
     assert sorted(log.read_text().split()) == sorted(set(log.read_text().split()))
     assert len(log.read_text().split()) == NUM_TASKS
+
+
+STAGES = {
+    "claimed": "relume_worker.bake_kind.BakeKind._expect_work",
+    "started": "relume_worker.runner.start_run",
+    "prepared": "relume_worker.runner.run_bake.create_stage",
+    "task done": "relume_worker.ledger.Ledger.finish_task",
+    "all tasks done": "relume_worker.runner.publish",
+    "published": "relume_worker.runner.delete_partial",
+}
+
+
+@pytest.mark.parametrize("stage", ["queued", *STAGES])
+def test_bake_is_canceled_at_any_stage_and_resumes(
+    tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    service = open_service(tmp_path)
+    identity = service.submit(SCENE.id, RECIPE)
+
+    def ended() -> bool:
+        return service.get(identity).state == "canceled" and not service.jobs._runs
+
+    def cancel_first(*arguments: Any, **options: Any) -> Any:
+        service.cancel(identity)
+        return call(*arguments, **options)
+
+    if stage == "queued":
+        service.cancel(identity)
+    else:
+        call = resolve_name(STAGES[stage])
+        monkeypatch.setattr(STAGES[stage], cancel_first)
+    with service:
+        deadline = time.monotonic() + 60
+        while not ended():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        monkeypatch.undo()
+        assert service.ledger.get("bake", identity).owner is None
+        service.submit(SCENE.id, RECIPE)
+        assert follow(service, identity).state == "ready"
+        assert tree_hash(service.store_path(identity)) == expected
+
+
+def test_bake_with_a_damaged_recipe_fails_and_others_run(tmp_path: Path) -> None:
+    service = open_service(tmp_path)
+    damaged, intact = service.submit(SCENE.id, RECIPE), service.submit(SCENE.id, replace(RECIPE, num_lights=3))
+    with service.ledger.sessions.begin() as session:
+        session.execute(update(JobRow).where(JobRow.id == damaged).values(request="{"))
+    with service:
+        assert follow(service, intact).state == "ready"
+        assert [(bake.id, bake.state) for bake in service.bakes()] == [(intact, "ready"), (damaged, "failed")]
+        assert service.get(damaged).problem == UNREADABLE
+        assert service.submit(SCENE.id, RECIPE) == damaged
+        assert follow(service, damaged).state == "ready"
 
 
 def stop_half_way(service: BakeService) -> str:
@@ -202,21 +262,23 @@ def test_failure_is_one_sentence_and_a_retry_finishes(
 def test_failing_lane_is_logged_once_while_the_other_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
-    tried = threading.Event()
-    with open_service(tmp_path) as service:
-        run_next = service._run_next
+    monkeypatch.setattr("relume_worker.jobs.job_service.POLL_INTERVAL_S", 0.02)
+    tried, tries = threading.Event(), []
+    service = open_service(tmp_path)
+    claim, large = service.ledger.claim, service.ledger.submit(SCENE.id, RECIPE, Plan(1, TINY_BAKE_RAYS + 1, 1, 1))
 
-        def fails(tiny: bool) -> bool:
-            if tiny:
-                return run_next(tiny)
-            tries.append(tiny)
-            if len(tries) > 5:
-                tried.set()
-            raise DiskFullError("the database")
+    def fails(identity: str) -> bool:
+        if identity != large:
+            return claim(identity)
+        tries.append(identity)
+        if len(tries) > 5:
+            tried.set()
+        raise DiskFullError("the database")
 
-        tries: list[bool] = []
-        monkeypatch.setattr(service, "_run_next", fails)
+    monkeypatch.setattr(service.ledger, "claim", fails)
+    with service:
+        small = service.submit(SCENE.id, type(RECIPE)("fake", ("front",), (8, 8), 3))
+        assert follow(service, small).state == "ready"
         assert tried.wait(60)
     assert caplog.text.count("trying again") == 1
     assert "resolved" not in caplog.text
@@ -225,7 +287,7 @@ def test_failing_lane_is_logged_once_while_the_other_continues(
 def test_bake_that_the_ledger_cannot_record_reports_why_it_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
+    monkeypatch.setattr("relume_worker.jobs.job_service.POLL_INTERVAL_S", 0.02)
     service, has_room = open_service(tmp_path), threading.Event()
     claim = service.ledger.claim
 
@@ -283,12 +345,28 @@ def test_process_start_is_part_of_the_estimate(tmp_path: Path, monkeypatch: pyte
         follow(service, service.submit(SCENE.id, RECIPE))
         plan = service.plan(SCENE.id, RECIPE)
         warm_s = service.estimate_seconds(plan)
-        monkeypatch.setattr("relume_worker.service.is_tiny", lambda plan: False)
+        monkeypatch.setattr("relume_worker.bake_kind.is_tiny", lambda plan: False)
         cold_s = service.estimate_seconds(plan)
         monkeypatch.setattr(Executors, "has_cluster", True)
         assert service.estimate_seconds(plan) == warm_s
     assert warm_s is not None
     assert cold_s == pytest.approx(warm_s + START_S)
+
+
+def test_worker_processes_are_not_idle_while_they_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    users: list[int] = []
+    service = open_service(tmp_path)
+
+    def cluster() -> ThreadPoolExecutor:
+        users.append(service.executors._num_users)
+        return threads
+
+    monkeypatch.setattr(service.executors, "cluster", cluster)
+    with ThreadPoolExecutor(1) as threads, service:
+        large = service.ledger.submit(SCENE.id, RECIPE, Plan(1, TINY_BAKE_RAYS + 1, 1, 1))
+        assert follow(service, large).state == "ready"
+    assert users == [1]
+    assert service.executors._num_users == 0
 
 
 def test_unknown_names_are_rejected(tmp_path: Path) -> None:
@@ -379,7 +457,7 @@ def test_bake_taken_over_by_another_process_is_left_to_it(
     with open_service(tmp_path) as service:
         identity = service.submit(SCENE.id, RECIPE)
         assert has_begun.wait(30)
-        elsewhere = BakeRow.__table__.update().values(owner="elsewhere/1/nonce/0", heartbeat=time.time() + 600)
+        elsewhere = JobRow.__table__.update().values(owner="elsewhere/1/nonce/0", heartbeat=time.time() + 600)
         with service.ledger.sessions.begin() as session:
             session.execute(elsewhere)
         may_go_on.set()
@@ -400,7 +478,7 @@ def test_bake_deleted_at_the_end_of_a_task_is_not_a_failure(
     finish, deleted = Ledger.finish_task, threading.Event()
 
     def finish_deleted(ledger: Ledger, identity: str, *arguments: Any) -> bool:
-        ledger.delete_bakes([identity])
+        ledger.delete([identity])
         deleted.set()
         return finish(ledger, identity, *arguments)
 
@@ -479,10 +557,11 @@ def test_abandoned_stores_are_removed_at_start(tmp_path: Path, monkeypatch: pyte
 def test_published_store_of_a_killed_service_is_used_unchanged(tmp_path: Path) -> None:
     service = open_service(tmp_path)
     identity = service.submit(SCENE.id, RECIPE)
-    service.ledger.claim(identity, "elsewhere/1/nonce/0")
+    elsewhere = copy(service.ledger)
+    elsewhere.owner = "elsewhere/1/nonce/0"
+    assert elsewhere.claim(identity)
     bake_in_process(FakeMethod(), SCENE, RECIPE, service.store_path(identity))
-    service.ledger.renew_lease(identity, "elsewhere/1/nonce/0")
-    service.ledger._change(identity, None, heartbeat=time.time() - 2 * lease.LEASE_S)
+    assert elsewhere.update_leased(identity, heartbeat=time.time() - 2 * lease.LEASE_S)
     with service:
         assert follow(service, identity).state == "ready"
 

@@ -11,19 +11,15 @@ import itertools
 import logging
 import os
 import socket
-import threading
 import uuid
-from collections.abc import Callable
 from pathlib import Path
-
-from relume_worker.database.failures import DATABASE_ERRORS, DatabaseError
 
 log = logging.getLogger(__name__)
 
 LEASE_S = 15.0
 HEARTBEAT_S = 1.0
 RENEW_S = LEASE_S / 5
-"""Interval of `LeaseRenewer`, which is for long steps: between them heartbeats renew the lease."""
+"""Interval at which a service renews all its leases; between them bakes record their progress."""
 
 _NONCE = uuid.uuid4().hex
 _numbers = itertools.count()
@@ -94,29 +90,3 @@ def may_run(owner: str) -> bool:
     except PermissionError:
         return True
     return True
-
-
-class LeaseRenewer:
-    """Renews the lease of a job while it runs, also through long steps such as the check before publishing."""
-
-    def __init__(self, renew: Callable[[str, str], object], work_id: str, owner: str) -> None:
-        self._renew, self._work_id, self._owner = renew, work_id, owner
-        self._done = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="relume-lease", daemon=True)
-
-    def __enter__(self) -> LeaseRenewer:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._done.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        database_error = DatabaseError(log, f"the lease of {self._work_id} cannot be renewed")
-        while not self._done.wait(RENEW_S):
-            try:
-                self._renew(self._work_id, self._owner)
-                database_error.report_recovered()
-            except DATABASE_ERRORS as error:  # a short database outage costs no lease
-                database_error.report_failure(error)

@@ -10,24 +10,16 @@ import logging
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from concurrent.futures import CancelledError as FutureCancelledError
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
+from typing import Any
 
-from relume.core.errors import (
-    CancelledError,
-    ChunkDamagedError,
-    DiskFullError,
-    NotFoundError,
-    RelumeError,
-    StorageError,
-    bytes_text,
-    is_disk_full,
-)
+from relume.core.errors import CancelledError, ChunkDamagedError, RelumeError, StorageError
 from relume.core.filesystem import remove_folder
 from relume.core.folder_size import folder_bytes
 from relume.scene.model import Scene
@@ -37,7 +29,9 @@ from relume.store.disk_space import check_disk_space
 from relume.store.publish import publish
 from relume.store.reader import open_store, read_code
 from relume_worker.database.retry import Given, Result, with_retry
-from relume_worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
+from relume_worker.estimate import crowding, machine_load
+from relume_worker.jobs.job import BAKE
+from relume_worker.lease import HEARTBEAT_S
 from relume_worker.ledger import Ledger
 from relume_worker.paths import bake_path, staging_path
 from relume_worker.progress import ExpectedWork, Progress
@@ -61,7 +55,7 @@ LOSS_LOG_INTERVAL_S = 1.0
 
 @dataclass
 class BakeRunner:
-    """One run of a bake whose lease is `owner`'s.
+    """One run of a bake whose lease the ledger has.
 
     Attributes:
         max_in_flight: maximum number of submitted tasks; the rest wait here, so that canceling is immediate.
@@ -73,7 +67,6 @@ class BakeRunner:
 
     ledger: Ledger
     bake: BakeInput
-    owner: str
     executor: Executor
     max_in_flight: Callable[[], int]
     on_change: Callable[[], None] = lambda: None
@@ -85,39 +78,30 @@ class BakeRunner:
     _partial_uploads: PartialUploads | None = None
     _last_loss_s: float = -inf
 
-    def run(self) -> None:
-        """Bake and publish; every failure is recorded in the ledger as a state and a sentence."""
-        with LeaseRenewer(self.ledger.renew_lease, self.bake.bake_id, self.owner), idle_timer.keep_awake():
-            delete_note(self._staging)  # of an earlier run
-            self._run()
-            delete_note(self._staging)
-        self.on_change()
+    def run(self) -> Mapping[str, Any]:
+        """Bake and publish.
 
-    def _run(self) -> None:
-        identity = self.bake.bake_id
-        try:
-            num_bytes = self._bake()
-            push(self._target)
-            self._renew_lease()
-            delete_run(self._staging)
-            with suppress(StorageError):  # the bake is published; leftovers are deleted with its scene
-                delete_partial(identity)
-        except CancelledError:
-            self._drain()
-            has_lease = self._call_ledger(self.ledger.release, identity, self.owner)
-        except Exception as error:  # errors of a method must not end the service
-            self._drain()
-            if not self._exists():  # deleted during a task, with its files
-                return
-            if not isinstance(error, RelumeError | OSError):
-                log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
-            has_lease = self._call_ledger(
-                self.ledger.finish, identity, self.owner, "failed", self._error_message(error)
-            )
-        else:
-            has_lease = self._call_ledger(self.ledger.finish, identity, self.owner, "ready", num_bytes=num_bytes)
-        if not has_lease and self._exists():
-            log_lost_lease("bake", identity)
+        Returns:
+            Columns of the bake's row when it is ready.
+        Raises:
+            CancelledError: it was canceled, deleted or taken over, or the service is closing. Any other exception: it
+                has failed; finished tasks are in the ledger.
+        """
+        with idle_timer.keep_awake():
+            delete_note(self._staging)  # of an earlier run
+            try:
+                num_bytes = self._bake()
+                push(self._target)
+                self._renew_lease()
+                delete_run(self._staging)
+                with suppress(StorageError):  # the bake is published; leftovers are deleted with its scene
+                    delete_partial(self.bake.bake_id)
+            except Exception:
+                self._drain()
+                raise
+            finally:
+                delete_note(self._staging)
+        return {"progress": 1.0, "crowding": crowding(machine_load()), "bytes": num_bytes}
 
     def _renew_lease(self) -> None:
         """Renew the lease before changing files that another process, if it has the bake now, uses.
@@ -125,7 +109,7 @@ class BakeRunner:
         Raises:
             CancelledError: another process has the bake.
         """
-        if not self._call_ledger(self.ledger.renew_lease, self.bake.bake_id, self.owner):
+        if not self._call_ledger(self.ledger.renew_lease, self.bake.bake_id):
             raise CancelledError("another process has the bake")
 
     def _bake(self) -> int:
@@ -145,14 +129,14 @@ class BakeRunner:
         try:
             return publish(staging, target, self._renew_lease)
         except ChunkDamagedError:
-            if self._call_ledger(self.ledger.delete_tasks, bake.bake_id, self.owner):
+            if self._call_ledger(self.ledger.delete_tasks, bake.bake_id, is_running=True):
                 shutil.rmtree(staging, ignore_errors=True)
             raise
 
     def _start_or_resume(self) -> None:
         """Resume an earlier run if it is here and by the same code; otherwise start from nothing."""
         identity, staging = self.bake.bake_id, self._staging
-        run = self._call_ledger(self.ledger.get_run, identity)
+        run = self._call_ledger(self.ledger.get, BAKE, identity).run
         is_local = staging.exists() and get_run(staging) == run
         finished_tasks = self._call_ledger(self.ledger.finished_tasks, identity)
         if not is_local and run is not None and fetch_partial(staging, identity, run, finished_tasks):
@@ -168,7 +152,7 @@ class BakeRunner:
         self._renew_lease()
         shutil.rmtree(staging, ignore_errors=True)
         run = start_run(staging)
-        if not self._call_ledger(self.ledger.restart, identity, self.owner, self.bake.code, run, reason):
+        if not self._call_ledger(self.ledger.restart, identity, self.bake.code, run, reason):
             raise CancelledError("the bake was stopped")
         self._partial_uploads = PartialUploads(staging, identity, run, ())
 
@@ -249,17 +233,16 @@ class BakeRunner:
         """Record a finished task, after its shards are stored where other machines find them."""
         if self._partial_uploads is not None:
             self._partial_uploads.store((task.stage, task.index))
-        if not self._call_ledger(self.ledger.finish_task, self.bake.bake_id, self.owner, task, cost, attempt):
+        if not self._call_ledger(self.ledger.finish_task, self.bake.bake_id, task, cost, attempt):
             raise CancelledError("the bake was deleted, or another process has it")
 
     def _heartbeat(self, progress: Progress, phase: Phase) -> None:
         """Record progress; raise CancelledError if this run should end."""
         if phase != self._phase_entered[0]:
             self._phase_entered = phase, time.time()
-        phase_fields = dict(zip(("phase", "phase_since"), self._phase_entered, strict=True))
-        if self.is_stopped() or not self._call_ledger(
-            self.ledger.heartbeat, self.bake.bake_id, self.owner, **progress.fields(), **phase_fields
-        ):
+        entered = dict(zip(("phase", "phase_since"), self._phase_entered, strict=True))
+        fields = {"state": "running", **progress.fields(), **entered}
+        if self.is_stopped() or not self._call_ledger(self.ledger.update_leased, self.bake.bake_id, **fields):
             raise CancelledError("the bake was stopped")
         self.on_change()
 
@@ -279,29 +262,6 @@ class BakeRunner:
     def _call_ledger(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
         """Call the ledger; an outage delays the bake, and does not end it."""
         return with_retry(self.is_stopped, call, *args, **kwargs)
-
-    def _exists(self) -> bool:
-        try:
-            self._call_ledger(self.ledger.bake, self.bake.bake_id)
-        except NotFoundError:
-            return False
-        return True
-
-    def _error_message(self, error: Exception) -> str:
-        """Error and remedy, in one line."""
-        if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
-            needed_bytes = self._call_ledger(self.ledger.bake, self.bake.bake_id).plan.planned_bytes
-            missing_text = bytes_text(max(1_000_000, needed_bytes - folder_bytes(self._staging)))
-            return f"disk full; free {missing_text}, then bake again; finished tasks are saved"
-        if isinstance(error, RelumeError):
-            return " ".join(str(error).split())
-        if type(error).__name__ == "CommClosedError":  # the connection closed while submitting
-            return SCHEDULER_LOST_MESSAGE
-        if isinstance(error, MemoryError):
-            return "out of memory; give fewer lights or a smaller size, then bake again; finished tasks are saved"
-        if isinstance(error, OSError):
-            return f"a file cannot be read or written ({error.strerror}); fix this, then bake again"
-        return f"internal error: {type(error).__name__}: {str(error)[:200]}; the log has the traceback"
 
     @property
     def _target(self) -> Path:

@@ -170,7 +170,7 @@ def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
 def _delete_bake_rows(ledger: Ledger, ids: Sequence[str]) -> None:
     for identity in ids:
         ledger.cancel(identity)
-    ledger.delete_bakes(ids)
+    ledger.delete(ids)
 
 
 def _remove_stores(data_dir: Path, ids: Sequence[str]) -> None:

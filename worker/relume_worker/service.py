@@ -11,44 +11,43 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from sqlalchemy.exc import SQLAlchemyError
-
-from relume.core.errors import NotFoundError, ParameterError, StorageError
+from relume.core.errors import NotFoundError, StorageError
 from relume.core.source_hash import bake_code
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.reader import read_code
 from relume_worker.backup.restore import refuse_unfinished
+from relume_worker.bake_kind import BakeKind
 from relume_worker.budget import check_budget
 from relume_worker.database import open_database
 from relume_worker.database.failures import DatabaseError
-from relume_worker.estimate import crowding, estimate_seconds, machine_load
 from relume_worker.executor import Executors, is_tiny
 from relume_worker.idle_timer import idle_seconds
-from relume_worker.jobs.fair_share import FairShare
-from relume_worker.lease import LeaseRenewer, new_owner
+from relume_worker.jobs.job import BAKE
+from relume_worker.jobs.job_service import JobService
 from relume_worker.ledger import Ledger
 from relume_worker.paths import bake_path, scene_path
-from relume_worker.progress import ExpectedWork
 from relume_worker.run_marker import delete_run, get_run
-from relume_worker.runner import BakeRunner, check_published
+from relume_worker.runner import check_published
 from relume_worker.status import BakeStatus, bake_id
-from relume_worker.status_bus import BlockedBake, StatusBus, Subscription
+from relume_worker.status_bus import StatusBus, Subscription
 from relume_worker.storage import get_storage, is_in_storage, push
 from relume_worker.storage.partial_uploads import delete_partial
 from relume_worker.task_notes import delete_note
-from relume_worker.tasks import BakeInput, idle_timer, load_registered_scene
+from relume_worker.tasks import idle_timer, load_registered_scene
 
 log = logging.getLogger(__name__)
 
-POLL_S = 1.0
 CLOSE_S = 10.0
+IDLE_CHECK_S = 1.0
 STOPPED_RETENTION_S = 7 * 86_400.0  # lifetime of the finished tasks of a failed or canceled bake
-START_S = 8.0  # start of worker processes, if none are running: measured on two cores
-NUM_REFERENCE_BAKES = 8  # finished bakes used for an estimate
 
 
 class BakeService:
-    """Queues, runs and follows bakes. Several services may share a data directory and a ledger."""
+    """Queues, runs and follows bakes. Several services may share a data directory and a ledger.
+
+    Attributes:
+        jobs: runs the bakes, and jobs of other kinds that are added before `start`. kind: the bakes among them.
+    """
 
     def __init__(
         self,
@@ -74,38 +73,31 @@ class BakeService:
         self.data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
         refuse_unfinished(self.data_dir)
         self.ledger = Ledger(open_database(ledger_url or f"sqlite:///{self.data_dir / 'relume.db'}"))
-        self._methods = methods
         self.executors = Executors(scheduler, num_workers)
-        self._blocked_bakes = BlockedBake()
         self._status_bus = StatusBus(self.get)
-        self._database_errors = {
-            tiny: DatabaseError(log, f"the queue of {kind} cannot be processed")
-            for tiny, kind in ((False, "bakes"), (True, "small bakes"))
-        }
-        self._owner = new_owner()
+        self.jobs = JobService(self.ledger, client_weights or {})
+        on_change, is_closing = self._status_bus.notify_change, lambda: self.jobs.is_closing
+        self.kind = BakeKind(self.data_dir, self.ledger, self.executors, methods, on_change, is_closing)
+        self.jobs.add_kind(self.kind)
         self._closing = threading.Event()
-        self._is_crowding = threading.Event()
-        self._start_s = START_S
-        self._fair_shares = {is_tiny_lane: FairShare(client_weights or {}) for is_tiny_lane in (True, False)}
-        self._wakes = {True: threading.Event(), False: threading.Event()}
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
-        """Start running bakes: queued ones, and those that a dead process left."""
+        """Start running bakes and other jobs: queued ones, and those that a dead process left."""
         self._delete_orphans()
-        for tiny in (True, False):
-            name = "relume-tiny-bakes" if tiny else "relume-bakes"
-            self._threads.append(threading.Thread(target=self._run_lane, args=(tiny,), name=name, daemon=True))
-            self._threads[-1].start()
-
+        self.jobs.start()
+        works = {"relume-idle": self._stop_idle_processes}
         if get_storage() is not None:
-            self._threads.append(threading.Thread(target=self._store_all, name="relume-storage", daemon=True))
+            works["relume-storage"] = self._store_all
+        for name, work in works.items():
+            self._threads.append(threading.Thread(target=work, name=name, daemon=True))
             self._threads[-1].start()
 
     def close(self) -> None:
         """Stop running bakes; an unfinished one resumes at the next start."""
         self._closing.set()
-        self._notify_change()
+        self._status_bus.notify_change()
+        self.jobs.close()
         for thread in self._threads:
             thread.join(CLOSE_S)
         self.executors.close()
@@ -135,7 +127,7 @@ class BakeService:
         identity = self._resolve_scene_id(scene_id)
         with idle_timer.keep_awake():
             scene = recipe.add_cameras(load_registered_scene(self.data_dir, identity))
-            method = self._method(recipe.method)
+            method = self.kind.method(recipe.method)
             plan = method.plan(scene, recipe)
             disk = estimate_disk(method, scene, recipe, plan)
         plan = replace(plan, disk_bytes=disk.store, scratch_bytes=disk.scratch)
@@ -158,15 +150,15 @@ class BakeService:
 
     def get(self, bake_id: str) -> BakeStatus:
         """Return a bake. Raises NotFoundError."""
-        return self._blocked_bakes.with_reason(self.ledger.bake(bake_id))
+        return self.kind.blocked.with_reason(self.ledger.bake(bake_id))
 
     def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
         """All bakes, or those of a scene; newest first."""
-        return [self._blocked_bakes.with_reason(status) for status in self.ledger.bakes(scene_id)]
+        return [self.kind.blocked.with_reason(status) for status in self.ledger.bakes(scene_id)]
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake, whichever process runs it. Raises NotFoundError."""
-        return self._status_bus.subscribe(bake_id)
+        return Subscription(self._status_bus, bake_id)
 
     def cancel(self, bake_id: str) -> bool:
         """Cancel a bake; finished tasks are saved for a resume. False if it is neither queued nor running."""
@@ -188,48 +180,13 @@ class BakeService:
         return bake_path(self.data_dir, bake_id)
 
     def estimate_seconds(self, plan: Plan) -> float | None:
-        """Estimate the seconds of a bake from finished bakes; None if there are none.
-
-        Includes starting processes and loading kernels.
-        """
-        work_s = self._work_s(plan)
-        is_cold = not is_tiny(plan) and not self.executors.has_cluster
-        return work_s if work_s is None or not is_cold else work_s + self._start_s
-
-    def _work_s(self, plan: Plan) -> float | None:
-        """Seconds from the start of the first task."""
-        load = machine_load()
-        if (
-            is_tiny(plan) or not self._is_crowding.is_set()
-        ):  # otherwise a bake that ends before this one would count twice
-            load += self.executors.num_workers
-        completed = self.ledger.finished_bakes(NUM_REFERENCE_BAKES)
-        return estimate_seconds(plan, completed, self.executors.num_workers, crowding(load))
-
-    def _expect_work(self, status: BakeStatus, parallel: int) -> ExpectedWork:
-        method = self._method(status.recipe.method)
-        seconds = self.ledger.stage_seconds(status.scene, method.name, self.executors.num_workers, NUM_REFERENCE_BAKES)
-        total, stages = sum(seconds.values()), range(len(method.stages))
-        stage_fractions = [seconds.get(stage, 0.0) / total for stage in stages] if total else None
-        return ExpectedWork(self._work_s(status.plan), stage_fractions, parallel)
-
-    def workers_resident_bytes(self) -> int:
-        """Resident memory of this service's worker processes, in bytes."""
-        return self.executors.resident_bytes()
+        """Estimate the seconds of a bake from finished bakes, with the start of processes; None if there are none."""
+        return self.kind.estimate_seconds(plan)
 
     def _resolve_scene_id(self, scene_id: str) -> str:
         from relume_worker.scenes import get_scene
 
         return get_scene(self.ledger, scene_id).id
-
-    def _method(self, name: str) -> BakeMethod:
-        if self._methods is None:
-            from relume.methods.registry import METHODS
-
-            self._methods = METHODS
-        if name not in self._methods:
-            raise ParameterError("method", name, f"one of {', '.join(sorted(self._methods))}")
-        return self._methods[name]
 
     def _is_ready(self, identity: str) -> bool:
         """True if a bake is finished and its store is usable; a lost or damaged store is queued again."""
@@ -242,83 +199,16 @@ class BakeService:
         if check_published(self.store_path(identity)) or is_in_storage(self.store_path(identity)):
             return True
         self.ledger.delete_tasks(identity)
-        self.ledger.requeue(identity, ("ready",))
+        self.ledger.requeue_bake(identity, ("ready",))
         return False
 
     def _notify_change(self) -> None:
         self._status_bus.notify_change()
-        for wake in self._wakes.values():
-            wake.set()
+        self.jobs.wake()
 
-    def _run_lane(self, tiny: bool) -> None:
-        """Run bakes one after another. Tiny ones have a lane of their own: a preview never waits for a long bake."""
-        while not self._closing.is_set():
-            try:
-                self._wakes[tiny].clear()
-                has_run = self._run_next(tiny)
-                if has_run or not self._blocked_bakes:  # a bake waiting for its own lease is not blocked by the disk
-                    self._database_errors[tiny].report_recovered()
-                if has_run:
-                    continue
-                if not tiny:
-                    self.executors.stop_idle_cluster(idle_seconds())
-                self._wakes[tiny].wait(POLL_S)
-            except Exception as error:  # the lane must survive an unavailable database
-                self._database_errors[tiny].report_failure(error)
-                self._closing.wait(POLL_S)
-
-    def _run_next(self, tiny: bool) -> bool:
-        fair_share = self._fair_shares[tiny]
-        for waiting_bake in fair_share.sort([each for each in self.ledger.claimable() if each.is_first == tiny]):
-            try:
-                if self.ledger.claim(waiting_bake.id, self._owner):
-                    self._blocked_bakes.report_resumed(waiting_bake.id)
-                    fair_share.pick_next(waiting_bake.client)
-                    self._run(self.ledger.bake(waiting_bake.id), tiny)
-                    return True
-            except Exception as error:
-                self._blocked_bakes.report_blocked(self.ledger.bake(waiting_bake.id), error)
-                raise
-        return False
-
-    def _run(self, status: BakeStatus, tiny: bool) -> None:
-        self._status_bus.notify_change()
-        start_s, is_cold = time.monotonic(), not self.executors.has_cluster
-        try:
-            method = self._method(status.recipe.method)
-            expected_work = self._expect_work(status, 1 if tiny else self.executors.num_workers)
-            if not tiny:
-                self.ledger.heartbeat(status.id, self._owner, phase="starting", phase_since=time.time())
-                self._status_bus.notify_change()
-            with LeaseRenewer(self.ledger.renew_lease, status.id, self._owner):  # starting a cluster may take longer
-                executor = self.executors.local() if tiny else self.executors.cluster()
-        except SQLAlchemyError:  # its lease expires, and it is claimed again
-            raise
-        except Exception as error:
-            self.ledger.finish(status.id, self._owner, "failed", str(error))
-            self._status_bus.notify_change()
-            return
-        runner = BakeRunner(
-            ledger=self.ledger,
-            bake=BakeInput(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
-            owner=self._owner,
-            executor=executor,
-            max_in_flight=(lambda: 1) if tiny else (lambda: 2 * self.executors.num_processes()),
-            on_change=self._status_bus.notify_change,
-            is_stopped=self._closing.is_set,
-            expected_work=expected_work,
-        )
-        if tiny:
-            runner.run()
-            return
-        self._is_crowding.set()
-        try:
-            with self.executors.keep_cluster():
-                runner.run()
-        finally:
-            self._is_crowding.clear()
-        if is_cold and runner.working_since is not None:
-            self._start_s = runner.working_since - start_s
+    def _stop_idle_processes(self) -> None:
+        while not self._closing.wait(IDLE_CHECK_S):
+            self.executors.stop_idle_cluster(idle_seconds())
 
     def _store_all(self) -> None:
         """Upload local data that the storage lacks: from before it was configured, or from an outage."""
@@ -347,11 +237,10 @@ class BakeService:
             if state == "ready" or (
                 is_stopped and (read_code(folder) != bake_code() or _age_s(folder) > STOPPED_RETENTION_S)
             ):
-                if is_stopped and get_run(folder) == self.ledger.get_run(
-                    identity
-                ):  # otherwise its tasks are another machine's
-                    self.ledger.delete_tasks(identity)
-                    with suppress(StorageError):  # leftovers are deleted with the bake
+                with suppress(NotFoundError, StorageError):  # deleted meanwhile; leftovers are deleted with the bake
+                    # otherwise its tasks are another machine's
+                    if is_stopped and get_run(folder) == self.ledger.get(BAKE, identity).run:
+                        self.ledger.delete_tasks(identity)
                         delete_partial(identity)
                 shutil.rmtree(folder, ignore_errors=True)
                 delete_note(folder)

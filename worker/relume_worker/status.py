@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from typing import Any, Literal
 
 from relume.core.source_hash import bake_code
@@ -103,7 +102,6 @@ def recipe_json(recipe: Recipe) -> str:
     return json.dumps(asdict(recipe), sort_keys=True, separators=(",", ":"))
 
 
-@lru_cache(maxsize=4096)  # of the same rows, twice a second
 def recipe_from_json(text: str) -> Recipe:
     """Inverse of `recipe_json`."""
     document: dict[str, Any] = json.loads(text)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
-import queue
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from math import inf
 
 from relume.core.errors import DiskFullError, NotFoundError
 from relume_worker.database.failures import DATABASE_ERRORS, DatabaseError
@@ -20,41 +21,58 @@ class Subscription:
     """Changes of one bake, starting with its current state. Close it, or use it as a context manager.
 
     Attributes:
-        latest: newest state. is_closed: no change follows: it was closed, or the bake was deleted.
+        latest: newest state that was read.
     """
 
-    def __init__(self, bus: StatusBus, bake_id: str, first: BakeStatus) -> None:
-        self.bake_id = bake_id
-        self.latest, self.is_closed = first, False
-        self._bus = bus
-        self._changes: queue.SimpleQueue[BakeStatus | None] = queue.SimpleQueue()
-        self._changes.put(first)
+    def __init__(self, bus: StatusBus, bake_id: str) -> None:
+        self._bus, self._bake_id = bus, bake_id
+        self.latest = bus.read(bake_id)
+        self._is_first, self._has_ended = True, False
+
+    @property
+    def is_closed(self) -> bool:
+        """True if no change follows: it was closed, or the bake was deleted."""
+        return self._has_ended or self._bus.is_closed
 
     def get(self, timeout: float | None = None) -> BakeStatus | None:
         """Next change; None after `timeout` seconds, or if the subscription was closed."""
+        if self._is_first:
+            self._is_first = False
+            return self.latest
+        deadline = inf if timeout is None else time.monotonic() + timeout
+        while not self.is_closed:
+            num_changes = self._bus.num_changes
+            if (status := self._read()) is not None and status != self.latest:
+                self.latest = status
+                return status
+            if (left_s := deadline - time.monotonic()) <= 0:
+                break
+            self._bus.wait(num_changes, min(POLL_S, left_s))
+        return None
+
+    def _read(self) -> BakeStatus | None:
         try:
-            return self._changes.get(timeout=timeout)
-        except queue.Empty:
-            return None
+            status = self._bus.read(self._bake_id)
+        except NotFoundError:
+            self._has_ended = True
+        except DATABASE_ERRORS as error:
+            self._bus.database_error.report_failure(error)
+        else:
+            self._bus.database_error.report_recovered()
+            return status
+        return None
 
     def __iter__(self) -> Iterator[BakeStatus]:
         """Yield changes until the bake is ready, failed or canceled, or the subscription is closed."""
-        while (status := self._changes.get()) is not None:
+        while (status := self.get()) is not None:
             yield status
             if status.final:
                 return
 
-    def put(self, status: BakeStatus) -> None:
-        """Deliver a status if it differs from the last."""
-        if status != self.latest:
-            self.latest = status
-            self._changes.put(status)
-
     def close(self) -> None:
         """End the subscription; its iterators end too."""
-        self._bus.remove(self)
-        self.is_closed = True
-        self._changes.put(None)
+        self._has_ended = True
+        self._bus.notify_change()
 
     def __enter__(self) -> Subscription:
         return self
@@ -64,72 +82,32 @@ class Subscription:
 
 
 class StatusBus:
-    """Polls bakes for all subscriptions: at once after a change by this process, otherwise every half second.
+    """Wakes subscriptions at once after a change by this process; they also look every half second.
 
     Args:
         read: returns a bake. Raises NotFoundError.
     """
 
     def __init__(self, read: Callable[[str], BakeStatus]) -> None:
-        self._read = read
-        self._lock = threading.Lock()
-        self._subscriptions: set[Subscription] = set()
-        self._wake = threading.Event()
-        self._is_closed = False
-        self._thread: threading.Thread | None = None
-        self._database_error = DatabaseError(log, "changes of bakes cannot be read")
-
-    def subscribe(self, bake_id: str) -> Subscription:
-        """Follow a bake. Raises NotFoundError."""
-        subscription = Subscription(self, bake_id, self._read(bake_id))
-        with self._lock:
-            self._subscriptions.add(subscription)
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._watch, name="relume-bake-status", daemon=True)
-                self._thread.start()
-        self._wake.set()
-        return subscription
-
-    def remove(self, subscription: Subscription) -> None:
-        """Remove a subscription."""
-        with self._lock:
-            self._subscriptions.discard(subscription)
+        self.read, self.num_changes, self.is_closed = read, 0, False
+        self._changed = threading.Condition()
+        self.database_error = DatabaseError(log, "changes of bakes cannot be read")
 
     def notify_change(self) -> None:
-        """Poll now, because this process has changed the ledger."""
-        self._wake.set()
+        """Look now, because this process has changed the ledger."""
+        with self._changed:
+            self.num_changes += 1
+            self._changed.notify_all()
+
+    def wait(self, num_changes: int, timeout_s: float) -> None:
+        """Wait until there were more than `num_changes` changes, at most `timeout_s` seconds."""
+        with self._changed:
+            self._changed.wait_for(lambda: self.num_changes != num_changes, timeout_s)
 
     def close(self) -> None:
-        """End all subscriptions and the thread."""
-        self._is_closed = True
-        self._wake.set()
-        with self._lock:
-            subscriptions, thread = list(self._subscriptions), self._thread
-        for subscription in subscriptions:
-            subscription.close()
-        if thread is not None:
-            thread.join()
-
-    def _watch(self) -> None:
-        while not self._is_closed:
-            with self._lock:
-                subscriptions = list(self._subscriptions)
-            self._wake.wait(POLL_S if subscriptions else None)
-            self._wake.clear()
-            for bake_id in {subscription.bake_id for subscription in subscriptions}:
-                try:
-                    status = self._read(bake_id)
-                except NotFoundError:
-                    for subscription in [s for s in subscriptions if s.bake_id == bake_id]:
-                        subscription.close()
-                    continue
-                except DATABASE_ERRORS as error:
-                    self._database_error.report_failure(error)
-                    continue
-                self._database_error.report_recovered()
-                for subscription in subscriptions:
-                    if subscription.bake_id == bake_id:
-                        subscription.put(status)
+        """End all subscriptions."""
+        self.is_closed = True
+        self.notify_change()
 
 
 class BlockedBake:
@@ -137,10 +115,6 @@ class BlockedBake:
 
     def __init__(self) -> None:
         self._blocked: dict[str, tuple[float, str]] = {}
-
-    def __bool__(self) -> bool:
-        """True if any bake is blocked."""
-        return bool(self._blocked)
 
     def report_blocked(self, status: BakeStatus, error: Exception) -> None:
         """Record that a bake could not be claimed, or could not continue."""

@@ -21,7 +21,7 @@ from sqlalchemy import update
 from relume.store.bake_protocol import Recipe
 from relume_bench.scaling.fakes import SleepingMethod, ThreadExecutors, small_scene
 from relume_bench.scaling.ledger_calls import LedgerCalls
-from relume_worker.database.models import BakeRow
+from relume_worker.database.models import JobRow
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
@@ -67,8 +67,8 @@ class _Claims:
                 self.bake_s.append(time.monotonic() - self._times[identity])
             return finish(identity, *args, **fields)
 
-        def recorded(identity: str, owner: str) -> bool:
-            has_claimed = claim(identity, owner)
+        def recorded(identity: str) -> bool:
+            has_claimed = claim(identity)
             if has_claimed:
                 with self._lock:
                     self._times.setdefault(identity, time.monotonic())
@@ -97,7 +97,7 @@ def run(plan: FarmPlan) -> dict[str, Any]:
         for number in range(plan.num_machines):
             folder = Path(plan.folder) / ("" if plan.is_shared else f"machine{number}")
             service = BakeService(folder, plan.ledger, methods={"direct": method})
-            service.executors = ThreadExecutors(1)
+            service.executors = service.kind.executors = ThreadExecutors(1)
             claims.watch(service)
             machines.append(service)
         first = machines[0]
@@ -143,7 +143,7 @@ def run(plan: FarmPlan) -> dict[str, Any]:
 def _set_states(service: BakeService, bakes: Collection[str], state: str) -> None:
     """Queue bakes, or cancel them, by one statement."""
     with service.ledger.sessions.begin() as session:
-        session.execute(update(BakeRow).where(BakeRow.id.in_(bakes)).values(state=state))
+        session.execute(update(JobRow).where(JobRow.id.in_(bakes)).values(state=state))
 
 
 def fairness(served: list[str], submitted: list[str]) -> float:

@@ -16,12 +16,8 @@ from relume_server.session.audit_edits import WRITE_INTERVAL_S
 from relume_server.session.frames.bake_updates import POLL_S as SCENE_POLL_S
 from relume_worker.jobs.job_service import POLL_INTERVAL_S as JOB_POLL_S
 from relume_worker.lease import HEARTBEAT_S, RENEW_S
-from relume_worker.service import POLL_S as BAKE_POLL_S
 
 _MEAN_INTERVAL = 1 - JITTER / 2
-NUM_LANES = 2
-"""Threads of each server and worker machine that look for bakes: tiny ones, and all others."""
-
 CALLS_PER_BAKE, CALLS_PER_TASK = 28, 4
 """Claim, expected work, start, phases, publishing and end; of a task: renew the lease, read and write its row, record
 progress.
@@ -47,8 +43,7 @@ class Population:
 def calls_per_s(who: Population) -> dict[str, float]:
     """Statements a second, without opening sessions and without bakes, by cause."""
     return {
-        "queue of bakes": (who.servers + who.machines) * NUM_LANES / BAKE_POLL_S,
-        "queue of jobs": who.servers / JOB_POLL_S,
+        "queue": (who.servers + who.machines) / JOB_POLL_S,
         "bakes of open scenes": who.servers / (_MEAN_INTERVAL * SCENE_POLL_S),
         "tokens": who.servers / (_MEAN_INTERVAL * TOKEN_CACHE_S),
         "rooms": who.servers_with_rooms * (3 / RENEW_INTERVAL_S + 1 / COMMENT_POLL_S),

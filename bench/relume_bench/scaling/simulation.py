@@ -161,7 +161,7 @@ async def _run(
         at_end = [server.read() for server in servers]
     all_calls = sum(_statements(first, last).total() for first, last in zip(before, at_end, strict=True))
     farm_calls = sum(farm_result["statements"].values())
-    polls = calls_per_s(Population(0, sizes.machines, 0, 0))["queue of bakes"] * farm_result["wall_s"]
+    polls = calls_per_s(Population(0, sizes.machines, 0, 0))["queue"] * farm_result["wall_s"]
     predicted_farm = polls + farm_result["ready"] * bake_calls(sizes.tasks, farm_result["bake_s"])
     database_s = ledger.cpu_s() - database_s
     return {
@@ -245,7 +245,7 @@ def _people_result(
     editing = 0.0 if seconds < WRITE_INTERVAL_S else 1.0  # the audit writes at the end of its interval
     who = Population(len(before), 0, len(workplaces), len(with_rooms), editing)
     parts = calls_per_s(who)
-    polled = parts["queue of bakes"] + parts["queue of jobs"]
+    polled = parts["queue"]
     return {
         "seconds": seconds,
         "cpu_s": sum(last["cpu_s"] - first["cpu_s"] for first, last in zip(before, after, strict=True)),

@@ -8,7 +8,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import select
 
 from relume_server.services import ServicesDep
-from relume_worker.database.models import BakeRow
+from relume_worker.database.models import JobRow
 
 router = APIRouter(tags=["health"])
 
@@ -24,7 +24,7 @@ def readyz(services: ServicesDep) -> dict[str, str]:
     """The database is readable, the data directory has space, and the server is not draining."""
     services.drain.check()
     with services.bakes.ledger.sessions() as session:
-        session.execute(select(BakeRow.id).limit(1))
+        session.execute(select(JobRow.id).limit(1))
     services.access.quotas.check_room()
     return {"status": "ready"}
 

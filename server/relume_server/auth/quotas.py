@@ -18,7 +18,7 @@ from relume_server.auth.roles import Caller
 from relume_server.auth.tables import OwnedRow
 from relume_server.errors import NearlyFullError
 from relume_server.runtime.disk_space import free_bytes
-from relume_worker.database.models import BakeRow
+from relume_worker.database.models import JobRow
 from relume_worker.job_state import ACTIVE_STATES
 from relume_worker.jobs.job import BusyError, QuotaError
 
@@ -155,8 +155,8 @@ class Quotas:
         query = (
             select(func.count())
             .select_from(OwnedRow)
-            .join(BakeRow, BakeRow.id == OwnedRow.object)
-            .where(OwnedRow.kind == "bake", OwnedRow.owner == owner, BakeRow.state.in_(ACTIVE_STATES))
+            .join(JobRow, JobRow.id == OwnedRow.object)
+            .where(OwnedRow.kind == "bake", OwnedRow.owner == owner, JobRow.state.in_(ACTIVE_STATES))
         )
         with self._sessions() as session:
             num_active = session.scalar(query) or 0
@@ -174,14 +174,15 @@ class Quotas:
             OwnedRow.owner == owner, OwnedRow.kind != "bake"
         )
         bakes = (
-            select(OwnedRow.bytes, BakeRow.bytes, BakeRow.state, BakeRow.progress)
-            .join(BakeRow, BakeRow.id == OwnedRow.object)
+            select(OwnedRow.bytes, JobRow.bytes, JobRow.state, JobRow.progress)
+            .join(JobRow, JobRow.id == OwnedRow.object)
             .where(OwnedRow.kind == "bake", OwnedRow.owner == owner)
         )
         with self._sessions() as session:
             total = int(session.scalar(other_bytes) or 0)
             for planned, written, state, progress in session.execute(bakes):
-                total += planned if state in ACTIVE_STATES else written if state == "ready" else int(planned * progress)
+                kept = (written or 0) if state == "ready" else int(planned * (progress or 0.0))
+                total += planned if state in ACTIVE_STATES else kept
         return total
 
     def assign_owner(self, owner: str, kind: OwnedKind, object_id: str, num_bytes: int) -> None:

@@ -12,8 +12,9 @@ from relume.core.folder_size import folder_bytes
 from relume_server.batch.btf_steps import RESULT_FILE, UPLOAD_FILE
 from relume_server.schemas.btfs import BOUND, BtfRequest
 from relume_worker.jobs.job import Job
-from relume_worker.jobs.job_kind import JobHost, JobKind
+from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.job_service import JobService
 from relume_worker.paths import btfs_path
 
 BtfJob = Job[BtfRequest]
@@ -27,7 +28,7 @@ class BtfJobs(JobKind[BtfRequest]):
 
     def __init__(
         self,
-        service: JobHost,
+        service: JobService,
         data: Path,
         report_ready: Callable[[str, str, int], None],
         report_failed: Callable[[str], None],
@@ -69,11 +70,11 @@ class BtfJobs(JobKind[BtfRequest]):
         if (material := self.material(job.id)) is not None:
             self._report_ready(job.id, material, folder_bytes(self._btfs / material))
 
-    def on_ready(self, job: BtfJob) -> None:
+    def on_ready(self, identity: str) -> None:
         """Delete the uploads: the BTF is stored."""
-        (self.folder / job.id / UPLOAD_FILE).unlink(missing_ok=True)
+        (self.folder / identity / UPLOAD_FILE).unlink(missing_ok=True)
 
-    def on_failed(self, job: BtfJob) -> None:
+    def on_failed(self, identity: str) -> None:
         """Delete the uploads: the job cannot be resumed."""
-        shutil.rmtree(self.folder / job.id, ignore_errors=True)
-        self._report_failed(job.id)
+        shutil.rmtree(self.folder / identity, ignore_errors=True)
+        self._report_failed(identity)

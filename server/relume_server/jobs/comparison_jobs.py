@@ -14,8 +14,9 @@ from relume_server.batch.reference_passes import FIGURES
 from relume_server.schemas.base import Body
 from relume_server.schemas.bodies import ComparisonFigures, ComparisonRequest
 from relume_worker.jobs.job import Job
-from relume_worker.jobs.job_kind import JobHost, JobKind
+from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.job_service import JobService
 from relume_worker.jobs.step import Step
 
 ANSWER_S = 1.5  # estimates must answer quickly
@@ -45,7 +46,7 @@ class ComparisonJobs(JobKind[ComparisonRequest]):
 
     name, placeholder = "comparison", ComparisonRequest(bake="0" * 16, view="unknown", look={})
 
-    def __init__(self, service: JobHost, data: Path) -> None:
+    def __init__(self, service: JobService, data: Path) -> None:
         """
         Args:
             service: runs the jobs. data: data directory.

@@ -11,8 +11,9 @@ from relume.core.folder_size import folder_bytes
 from relume_server.io.downloads import safe_stem
 from relume_server.schemas.renders import RENDER_PLACEHOLDER, RenderRequest
 from relume_worker.jobs.job import Job
-from relume_worker.jobs.job_kind import JobHost, JobKind
+from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.job_service import JobService
 
 RenderJob = Job[RenderRequest]
 HEAD_BYTES = 1 << 16
@@ -28,7 +29,7 @@ class RenderJobs(JobKind[RenderRequest]):
 
     def __init__(
         self,
-        service: JobHost,
+        service: JobService,
         data: Path,
         scene_name: Callable[[str], str],
         report_bytes: Callable[[str, int], object],

@@ -20,7 +20,7 @@ from relume_worker.backup.contents import FileEntry, walk_files
 from relume_worker.backup.database_dump import copy_ledger
 from relume_worker.backup.repository import COPIES, BackupRepository, ReportBytes, Snapshot, StoredFile, compute_digest
 from relume_worker.database.connect import connect
-from relume_worker.database.models import BakeRow, SceneRow
+from relume_worker.database.models import JobRow, SceneRow
 from relume_worker.database.upgrading import latest_revision
 from relume_worker.storage import is_in_storage
 
@@ -90,7 +90,7 @@ def _required_paths(copy: Path) -> set[str]:
     with engine.connect() as connection:
         scenes = connection.scalars(select(SceneRow.id))
         paths = {f"scenes/{scene}/scene.json" for scene in scenes}
-        ready_ids = connection.scalars(select(BakeRow.id).where(BakeRow.state == "ready"))
+        ready_ids = connection.scalars(select(JobRow.id).where(JobRow.kind == "bake", JobRow.state == "ready"))
         paths |= {f"bakes/{bake}.zarr/{MANIFEST_NAME}" for bake in ready_ids}
     engine.dispose()
     return paths

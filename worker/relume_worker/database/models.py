@@ -41,51 +41,21 @@ class CameraRow(Base):
     document: Mapped[str] = mapped_column(Text)
 
 
-class BakeRow(Base):
-    """A bake. The process that runs it has the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the
-    database's clock).
-
-    Attributes:
-        code: code version that makes or made it; None in rows of older versions.
-        client: first user who submitted it; None in rows of older versions.
-        run: run marker of its unfinished store, see `relume_worker.run_marker`; None in rows of older versions.
-        crowding: see `relume_worker.estimate`; None if the bake is not ready, or older than this field.
-    """
-
-    __tablename__ = "bakes"
-
-    id: Mapped[str] = mapped_column(primary_key=True)
-    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
-    recipe: Mapped[str] = mapped_column(Text)
-    plan: Mapped[str] = mapped_column(Text)
-    state: Mapped[str] = mapped_column(index=True)
-    created: Mapped[float]
-    queued: Mapped[float]
-    progress: Mapped[float] = mapped_column(default=0.0)
-    phase: Mapped[str | None] = mapped_column(default=None)
-    phase_since: Mapped[float | None] = mapped_column(default=None)
-    crowding: Mapped[float | None] = mapped_column(default=None)
-    code: Mapped[str | None] = mapped_column(default=None)
-    run: Mapped[str | None] = mapped_column(default=None)
-    client: Mapped[str | None] = mapped_column(default=None)
-    rays_per_second: Mapped[float | None] = mapped_column(default=None)
-    seconds_left: Mapped[float | None] = mapped_column(default=None)
-    bytes: Mapped[int] = mapped_column(default=0)
-    problem: Mapped[str | None] = mapped_column(Text, default=None)
-    owner: Mapped[str | None] = mapped_column(default=None)
-    heartbeat: Mapped[float] = mapped_column(default=0.0)
-
-
 class JobRow(Base):
-    """A render, comparison or BTF job, see `relume_worker.jobs`. `request` is the body of the call as JSON.
-
-    The service that runs it has the lease: `owner`, renewed by `heartbeat` (seconds by the database's clock).
+    """A bake, render, comparison or BTF job, see `relume_worker.jobs`. The service that runs it has the lease: `owner`,
+    renewed by `heartbeat` (seconds since 1970 by the database's clock).
 
     Attributes:
-        kind: name of its `JobKind`.
+        kind: name of its `Kind`. request: the body of the call as JSON; of a bake, its recipe.
         done: finished steps.
-        client: who submitted it; null in rows of older versions. is_first: somebody waits for it.
-        created, started, ended: seconds since 1970; None: not yet, or in a row of an older version.
+        client: who submitted it first; None in rows of older versions. is_first: somebody waits for it: it is small.
+        created, queued, started, ended: seconds since 1970; None: not yet, or in a row of an older version.
+            queued: last time, if it was queued again.
+        scene_id, plan, progress, phase, phase_since, rays_per_second, seconds_left, bytes: of bakes, see
+            `relume_worker.status`.
+        code: code version that makes or made a bake. run: run marker of its unfinished store, see
+            `relume_worker.run_marker`. crowding: when it was ready, see `relume_worker.estimate`. None in rows of
+            older versions.
     """
 
     __tablename__ = "jobs"
@@ -103,6 +73,18 @@ class JobRow(Base):
     heartbeat: Mapped[float | None] = mapped_column(default=None)
     started: Mapped[float | None] = mapped_column(default=None)
     ended: Mapped[float | None] = mapped_column(default=None)
+    queued: Mapped[float | None] = mapped_column(default=None)
+    scene_id: Mapped[str | None] = mapped_column(ForeignKey("scenes.id"), index=True, default=None)
+    plan: Mapped[str | None] = mapped_column(Text, default=None)
+    progress: Mapped[float | None] = mapped_column(default=None)
+    phase: Mapped[str | None] = mapped_column(default=None)
+    phase_since: Mapped[float | None] = mapped_column(default=None)
+    rays_per_second: Mapped[float | None] = mapped_column(default=None)
+    seconds_left: Mapped[float | None] = mapped_column(default=None)
+    bytes: Mapped[int | None] = mapped_column(default=None)
+    code: Mapped[str | None] = mapped_column(default=None)
+    run: Mapped[str | None] = mapped_column(default=None)
+    crowding: Mapped[float | None] = mapped_column(default=None)
 
 
 class TaskRow(Base):
@@ -111,7 +93,7 @@ class TaskRow(Base):
     __tablename__ = "tasks"
     __table_args__ = (Index("tasks_of_bake", "bake_id"),)
 
-    bake_id: Mapped[str] = mapped_column(ForeignKey("bakes.id"), primary_key=True)
+    bake_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"), primary_key=True)
     stage: Mapped[int] = mapped_column(primary_key=True)
     index: Mapped[int] = mapped_column("task_index", primary_key=True)
     attempts: Mapped[int]

@@ -14,6 +14,7 @@ class Waiting:
     Attributes:
         client: user who submitted it. is_first: it is small. created: time of submission.
         num_elsewhere: work of its client that runs elsewhere, on other servers and machines.
+        kind, lane: of a job, see `relume_worker.jobs.job.lane`.
     """
 
     id: str
@@ -21,6 +22,8 @@ class Waiting:
     is_first: bool
     created: float
     num_elsewhere: int = 0
+    kind: str = ""
+    lane: str = ""
 
 
 class FairShare:

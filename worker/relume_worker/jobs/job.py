@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from relume.core.errors import RelumeError
 from relume_worker.database.models import JobRow
 
+BAKE = "bake"
 UNREADABLE = "the request cannot be read, because another version of relume wrote it or it is damaged; request it again"
 
 Request = TypeVar("Request", bound=BaseModel)
@@ -83,6 +84,15 @@ def read_row(row: JobRow, placeholder: Request) -> tuple[Request, str, str | Non
         return type(placeholder).model_validate_json(row.request), row.state, row.problem
     except ValidationError:
         return placeholder, "failed", UNREADABLE
+
+
+def lane(kind: str, *, is_first: bool) -> str:
+    """Lane of a job. Those of a lane take turns: small bakes, other bakes, and all other jobs.
+
+    Args:
+        kind: name of its kind. is_first: it is small.
+    """
+    return "jobs" if kind != BAKE else "small bakes" if is_first else "bakes"
 
 
 def new_id() -> str:

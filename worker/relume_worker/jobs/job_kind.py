@@ -1,4 +1,4 @@
-"""Interface of a kind of job, and what all kinds have in common.
+"""Kinds of jobs that are requests with steps, and what they have in common.
 
 To add a kind, write a subclass, and pass it to the `JobService`.
 """
@@ -6,35 +6,23 @@ To add a kind, write a subclass, and pass it to the `JobService`.
 from __future__ import annotations
 
 import shutil
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol
+from typing import Any, ClassVar, Generic
 
 from relume_worker.database.models import JobRow
 from relume_worker.job_state import ACTIVE_STATES
+from relume_worker.jobs.claim import claim
+from relume_worker.jobs.fair_share import Waiting
 from relume_worker.jobs.job import UNREADABLE, Job, JobFilter, NotReadyError, Request, new_id, read_row
-from relume_worker.jobs.job_ledger import JobLedger
 from relume_worker.jobs.job_run import JobRun
-from relume_worker.jobs.step import RunStep
+from relume_worker.jobs.job_service import JobService
+from relume_worker.jobs.kind import Kind
 from relume_worker.jobs.step_timer import StepTimer
 
 
-class JobHost(Protocol):
-    """Part of the service that a kind needs, see `relume_worker.jobs.job_service.JobService`."""
-
-    @property
-    def ledger(self) -> JobLedger: ...
-    @property
-    def run_step(self) -> RunStep: ...
-    @property
-    def is_closing(self) -> bool: ...
-    def add_kind(self, kind: Any) -> None: ...
-    def wake(self) -> None: ...
-    def timer(self, identity: str) -> StepTimer | None: ...
-
-
-class JobKind(ABC, Generic[Request]):
+class JobKind(Kind, Generic[Request]):
     """Jobs of one kind; their files are in `folder`/<id>/.
 
     A subclass defines its name, the number of steps, the priority, `run`, and a placeholder of requests that cannot be
@@ -42,17 +30,17 @@ class JobKind(ABC, Generic[Request]):
     takeover.
     """
 
-    name: ClassVar[str]
     placeholder: Request
     resumable: ClassVar[Sequence[str]] = ("canceled", "failed")
     """States from which a job can be resumed: its files are still there."""
 
-    def __init__(self, service: JobHost, folder: Path) -> None:
+    def __init__(self, service: JobService, folder: Path) -> None:
         """
         Args:
             service: runs the jobs. folder: created if missing.
         """
         self._service, self.folder = service, folder
+        self._timers: dict[str, StepTimer] = {}
         service.add_kind(self)
 
     @abstractmethod
@@ -71,11 +59,28 @@ class JobKind(ABC, Generic[Request]):
         """Seconds per step of earlier requests like this; None if unknown."""
         return None
 
-    def on_failed(self, job: Job[Request]) -> None:
-        """Called after the row has failed, by the owner of the lease; by default files are kept."""
+    def perform(self, work: Waiting) -> Mapping[str, Any]:
+        """Read the request, claim the folder, and run the steps."""
+        job = self.get(work.id)
+        self.check_readable(job)
+        folder, (is_first, step_s) = self.folder / job.id, (self.is_first(job.request), self.step_s(job.request))
+        folder.mkdir(parents=True, exist_ok=True)
+        claim(folder, self._service.ledger.owner)
+        run = JobRun(self._service, self.name, job, folder, is_first=is_first, step_s=step_s)
+        self._timers[job.id] = run.timer
+        try:
+            self.run(run)
+        finally:
+            del self._timers[job.id]
+        return {"done": job.total}
 
-    def on_ready(self, job: Job[Request]) -> None:
-        """Called after the row is ready, by the owner of the lease; by default files are kept."""
+    def error_text(self, identity: str, error: Exception) -> str:
+        """The service's sentence."""
+        return self._service.describe(error)
+
+    def on_deleted(self, identity: str) -> None:
+        """Delete the files."""
+        shutil.rmtree(self.folder / identity, ignore_errors=True)
 
     def submit(
         self,
@@ -116,7 +121,7 @@ class JobKind(ABC, Generic[Request]):
     def job(self, row: JobRow) -> Job[Request]:
         """Return the job of a row."""
         request, state, problem = read_row(row, self.placeholder)
-        total, timer = self.steps(request), self._service.timer(row.id) if row.state == "running" else None
+        total, timer = self.steps(request), self._timers.get(row.id) if row.state == "running" else None
         progress = min(1.0, (row.done + (timer.fraction if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
         times = row.created, row.started, row.ended
@@ -147,13 +152,13 @@ class JobKind(ABC, Generic[Request]):
     def delete(self, identity: str) -> None:
         """Stop a job and delete its files. Raises NotFoundError."""
         self.get(identity)
-        self._service.ledger.delete(identity)
+        self._service.ledger.delete([identity])
         shutil.rmtree(self.folder / identity, ignore_errors=True)
 
     def stop(self, identity: str) -> None:
         """Stop a queued or running job; its files stay for `resume`. Raises NotFoundError."""
         self.get(identity)
-        self._service.ledger.stop(identity)
+        self._service.ledger.cancel(identity)
 
     def resume(self, identity: str) -> None:
         """Queue a stopped or failed job again; no effect on a queued or running one.

@@ -1,7 +1,12 @@
 """Rows of jobs: states, quotas, leases.
 
-Only the owner of a row's lease changes its state, its files and its quota. A service that was suspended for longer than
-the lease notices at its next statement on the row, and drops its work.
+    queued ──claim──▶ running ──▶ ready
+      ▲                 │ └─────▶ failed     a failed or canceled job is queued again; its finished steps stay
+      └──requeue────────┴───────▶ canceled
+
+Every change is one statement that names the state it expects, so that of two racing processes only one succeeds. Only
+the owner of a row's lease changes its state, its files and its quota. A service that was suspended for longer than the
+lease notices at its next statement on the row, and drops its work.
 """
 
 from __future__ import annotations
@@ -10,18 +15,18 @@ import json
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, cast
 
-from sqlalchemy import CursorResult, Select, and_, func, or_, select, update
+from sqlalchemy import CursorResult, Select, and_, delete, func, or_, select, update
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.core.errors import NotFoundError
 from relume_worker.database.clock import epoch_s
-from relume_worker.database.models import BakeRow, JobRow
-from relume_worker.job_state import ACTIVE_STATES
+from relume_worker.database.models import JobRow, TaskRow
+from relume_worker.job_state import ACTIVE_STATES, JobState
 from relume_worker.jobs.fair_share import Waiting
-from relume_worker.jobs.job import BusyError, JobFilter, NotReadyError, Quota, QuotaError, noun
+from relume_worker.jobs.job import BAKE, BusyError, JobFilter, NotReadyError, Quota, QuotaError, lane, noun
 from relume_worker.lease import is_alive, log_taken_over
 
 HOLDS_S = 0.1
@@ -32,11 +37,11 @@ class JobLedger:
     """Jobs of all kinds in the database.
 
     Args:
-        sessions: of the database. quota: limits of each kind. owner: of leases that this process takes.
+        sessions: of the database. quota: limits of each kind. owner: of leases that this ledger takes.
     """
 
     def __init__(self, sessions: sessionmaker[Session], quota: Quota, owner: str) -> None:
-        self._sessions, self._quota, self.owner = sessions, quota, owner
+        self.sessions, self.quota, self.owner = sessions, quota, owner
         self._leased, self._leased_until_s, self._asking = frozenset[str](), 0.0, threading.Lock()
 
     def add(self, row: JobRow, prepare: Callable[[], object]) -> None:
@@ -47,14 +52,14 @@ class JobLedger:
         Raises:
             BusyError, QuotaError: the limit of all jobs of this kind, or of this client, is reached.
         """
-        with self._sessions.begin() as session:
+        with self.sessions.begin() as session:
             self._check_quota(session, row.kind, row.client or "")
             prepare()
             row.state, row.created = "queued", time.time()
             session.add(row)
 
     def _check_quota(self, session: Session, kind: str, client: str) -> None:
-        quota = self._quota
+        quota = self.quota
         active = JobRow.kind == kind, JobRow.state.in_(ACTIVE_STATES)
         clients = session.scalars(select(JobRow.client).where(*active)).all()
         if len(clients) >= quota.max_total:
@@ -66,7 +71,7 @@ class JobLedger:
 
     def get(self, kind: str, identity: str) -> JobRow:
         """Return the row of a job. Raises NotFoundError."""
-        with self._sessions() as session:
+        with self.sessions() as session:
             row = session.get(JobRow, identity)
         if row is None or row.kind != kind:
             raise NotFoundError(f"there is no {noun(kind)} {identity[:40]}; start one first")
@@ -74,7 +79,7 @@ class JobLedger:
 
     def exists(self, identity: str) -> bool:
         """True unless the job was deleted."""
-        with self._sessions() as session:
+        with self.sessions() as session:
             return session.get(JobRow, identity) is not None
 
     def page(
@@ -92,21 +97,21 @@ class JobLedger:
         if after is not None:
             is_later = JobRow.created < after[0] if newest_first else JobRow.created > after[0]
             query = query.where(or_(is_later, and_(JobRow.created == after[0], JobRow.id > after[1])))
-        with self._sessions() as session:
+        with self.sessions() as session:
             return session.scalars(query.order_by(created, JobRow.id)).all()
 
     def referencing(self, kind: str, text: str) -> list[str]:
         """Ids of queued and running jobs whose request contains a text, oldest first."""
         contains = JobRow.request.contains(text, autoescape=True)
         query = select(JobRow.id).where(JobRow.kind == kind, JobRow.state.in_(ACTIVE_STATES), contains)
-        with self._sessions() as session:
+        with self.sessions() as session:
             return list(session.scalars(query.order_by(JobRow.created)))
 
-    def delete(self, identity: str) -> None:
-        """Delete a row; whoever runs the job notices."""
-        with self._sessions.begin() as session:
-            if (row := session.get(JobRow, identity)) is not None:
-                session.delete(row)
+    def delete(self, identities: Collection[str]) -> None:
+        """Delete jobs in any state; whoever runs them notices."""
+        with self.sessions.begin() as session:
+            session.execute(delete(TaskRow).where(TaskRow.bake_id.in_(identities)))
+            session.execute(delete(JobRow).where(JobRow.id.in_(identities)))
 
     def requeue(self, row: JobRow, states: Sequence[str], prepare: Callable[[], object]) -> None:
         """Queue a job in one of some states again.
@@ -116,60 +121,82 @@ class JobLedger:
         Raises:
             NotReadyError: it is in another state. BusyError, QuotaError: as `add`.
         """
-        values = {"state": "queued", "problem": None, "ended": None}
-        statement = update(JobRow).where(JobRow.id == row.id, JobRow.state.in_(states)).values(values)
-        with self._sessions.begin() as session:
+        with self.sessions.begin() as session:
             self._check_quota(session, row.kind, row.client or "")
-            if _num_changed(session, statement) == 0:
+            if not queue_again(session, row.id, states):
                 state = session.scalar(select(JobRow.state).where(JobRow.id == row.id))
                 allowed = f"only one that is {' or '.join(states)} can be queued again"
                 raise NotReadyError(f"the {noun(row.kind)} is {state or 'deleted'}; {allowed}")
             prepare()
 
-    def stop(self, identity: str) -> None:
-        """Stop a queued or running job."""
-        self._update(JobRow.id == identity, JobRow.state.in_(ACTIVE_STATES), state="canceled", ended=time.time())
+    def cancel(self, identity: str) -> bool:
+        """Cancel a queued or running job; whoever runs it notices. False if it is neither."""
+        is_active = JobRow.id == identity, JobRow.state.in_(ACTIVE_STATES)
+        return self._update(*is_active, state="canceled", ended=time.time(), seconds_left=None, phase=None)
 
     # leases
 
-    def claimable(self, running: frozenset[str]) -> list[Waiting]:
-        """Jobs without a live owner. running: those that this service runs already."""
-        columns = JobRow.id, JobRow.client, JobRow.is_first, JobRow.created, JobRow.owner, JobRow.heartbeat
-        query = select(*columns, epoch_s().label("now")).where(JobRow.state.in_(ACTIVE_STATES))  # requests may be large
-        with self._sessions() as session:
-            rows = [(row, self._is_leased(row)) for row in session.execute(query)]
-        num_elsewhere = Counter(row.client or "" for row, is_leased in rows if is_leased)
+    def claimable(self, kinds: Collection[str], running: Collection[str] = ()) -> list[Waiting]:
+        """Jobs without a live owner: queued, or left by a dead one.
+
+        Args:
+            kinds: kinds of the jobs. running: those that this service runs already.
+        """
+        queued = func.coalesce(JobRow.queued, JobRow.created).label("queued")
+        columns = JobRow.id, JobRow.kind, JobRow.client, JobRow.is_first, JobRow.owner, JobRow.heartbeat, queued
+        query = select(*columns, epoch_s().label("now"))  # requests may be large
+        with self.sessions() as session:
+            rows = session.execute(query.where(JobRow.state.in_(ACTIVE_STATES), JobRow.kind.in_(kinds))).all()
+        free, num_elsewhere = [], Counter[tuple[str, str]]()
+        for row in rows:
+            client, row_lane = row.client or "", lane(row.kind, is_first=bool(row.is_first))
+            if self._is_leased(row):
+                num_elsewhere[client, row_lane] += 1
+            elif row.id not in running:
+                free.append((row, client, row_lane))
         return [
-            Waiting(row.id, client := row.client or "", bool(row.is_first), row.created, num_elsewhere[client])
-            for row, is_leased in rows
-            if not is_leased and row.id not in running
+            Waiting(row.id, client, bool(row.is_first), row.queued, num_elsewhere[client, row_lane], row.kind, row_lane)
+            for row, client, row_lane in free
         ]
 
-    def claim(self, identity: str) -> JobRow | None:
-        """Take the lease of a job; None if another service was faster, or the job is not active any more."""
-        query = select(JobRow, epoch_s().label("now")).where(JobRow.id == identity)
-        with self._sessions() as session:
-            row_and_time = session.execute(query).first()
-        if row_and_time is None or self._is_leased(row_and_time[0], row_and_time[1]):
-            return None
-        row = row_and_time[0]
+    def claim(self, identity: str) -> bool:
+        """Take the lease of a job, and set it running. False if another service has it, or the job is not active."""
+        query = select(JobRow.kind, JobRow.owner, JobRow.heartbeat, epoch_s().label("now")).where(JobRow.id == identity)
+        with self.sessions() as session:
+            row = session.execute(query).first()
+        if row is None or self._is_leased(row):
+            return False
         is_unchanged = or_(JobRow.owner.is_(None), JobRow.owner == row.owner)
-        started = func.coalesce(JobRow.started, time.time())
         conditions = JobRow.id == identity, JobRow.state.in_(ACTIVE_STATES), is_unchanged
-        if not self._update(*conditions, owner=self.owner, heartbeat=epoch_s(), started=started):
-            return None
+        lease = {"owner": self.owner, "heartbeat": epoch_s(), "started": func.coalesce(JobRow.started, time.time())}
+        if not self._update(*conditions, state="running", phase=None, seconds_left=None, **lease):
+            return False
         if row.owner not in (None, self.owner):
-            log_taken_over(noun(row.kind), identity, str(row.owner))
-        return row
+            log_taken_over(noun(row.kind), identity, row.owner)
+        return True
 
-    def _is_leased(self, row: Any, now: float | None = None) -> bool:
+    def _is_leased(self, row: Any) -> bool:
         """True if another live service has the lease."""
-        is_other = row.owner not in (None, self.owner)
-        return is_other and is_alive(str(row.owner), row.heartbeat or 0.0, row.now if now is None else now)
+        return row.owner not in (None, self.owner) and is_alive(row.owner, row.heartbeat or 0.0, row.now)
 
     def renew_leases(self) -> None:
         """Renew all leases of this service."""
         self._update(JobRow.owner == self.owner, heartbeat=epoch_s())
+
+    def renew_lease(self, identity: str) -> bool:
+        """Renew the lease of a job in any state. False if it is not here any more."""
+        with self.sessions.begin() as session:
+            return self._renew_until_commit(session, identity)
+
+    def _renew_until_commit(self, session: Session, identity: str) -> bool:
+        """Renew a lease; true if this owner holds it until the transaction ends."""
+        is_owner = JobRow.id == identity, JobRow.owner == self.owner
+        return num_changed(session, update(JobRow).where(*is_owner).values(heartbeat=epoch_s())) == 1
+
+    def finish(self, identity: str, state: JobState, **values: Any) -> bool:
+        """Set the final state of an active job whose lease is here, and other columns. False if it is not any more."""
+        final = {"state": state, "ended": time.time(), "problem": None, "seconds_left": None, "phase": None}
+        return self.update_leased(identity, **{**final, **values})
 
     def update_leased(self, identity: str, **values: Any) -> bool:
         """Change an active row whose lease is here. False if it is not any more."""
@@ -186,7 +213,7 @@ class JobLedger:
         try:
             if is_known and not is_only:  # another thread asks for all
                 return True
-            with self._sessions() as session:
+            with self.sessions() as session:
                 query = select(JobRow.id).where(JobRow.owner == self.owner, JobRow.state.in_(ACTIVE_STATES))
                 self._leased = frozenset(session.scalars(query))
             self._leased_until_s = asked_s + HOLDS_S
@@ -200,23 +227,36 @@ class JobLedger:
         return self._update(JobRow.id == identity, JobRow.owner == self.owner, owner=None)
 
     def _update(self, *conditions: Any, **values: Any) -> bool:
-        with self._sessions.begin() as session:
-            return _num_changed(session, update(JobRow).where(*conditions).values(**values)) > 0
+        with self.sessions.begin() as session:
+            return num_changed(session, update(JobRow).where(*conditions).values(**values)) > 0
 
 
 def count_jobs(sessions: sessionmaker[Session], kinds: Sequence[str]) -> Mapping[tuple[str, str], int]:
     """Count bakes, and jobs of some kinds, by kind and state, "queued" or "running"."""
-    counts: dict[tuple[str, str], int] = {(kind, state): 0 for kind in ("bake", *kinds) for state in ACTIVE_STATES}
+    counts: dict[tuple[str, str], int] = {(kind, state): 0 for kind in (BAKE, *kinds) for state in ACTIVE_STATES}
     columns = JobRow.kind, JobRow.state
     jobs = select(*columns, func.count()).where(JobRow.state.in_(ACTIVE_STATES)).group_by(*columns)
-    bakes = select(BakeRow.state, func.count()).where(BakeRow.state.in_(ACTIVE_STATES)).group_by(BakeRow.state)
     with sessions() as session:
         counts.update({(kind, state): num for kind, state, num in session.execute(jobs)})
-        counts.update({("bake", state): num for state, num in session.execute(bakes)})
     return counts
 
 
-def _num_changed(session: Session, statement: Any) -> int:
+def queue_again(session: Session, identity: str, states: Sequence[str], **values: Any) -> bool:
+    """Queue a job in one of some states again.
+
+    Args:
+        session: in a transaction. identity: id of the job. states: from which it may be queued.
+        values: other columns to change.
+    Returns:
+        False if it is in another state, or deleted.
+    """
+    waiting = {"state": "queued", "queued": time.time(), **dict.fromkeys(("problem", "ended", "phase", "seconds_left"))}
+    statement = update(JobRow).where(JobRow.id == identity, JobRow.state.in_(states)).values({**waiting, **values})
+    return num_changed(session, statement) == 1
+
+
+def num_changed(session: Session, statement: Any) -> int:
+    """Execute a statement, and return the number of changed rows."""
     result = session.execute(statement, execution_options={"synchronize_session": False})
     return cast("CursorResult[Any]", result).rowcount
 

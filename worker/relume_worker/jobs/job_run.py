@@ -5,27 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from typing import Any, Generic, Protocol
+from typing import Any, Generic
 
 from relume.core.errors import CancelledError
 from relume_worker.jobs.job import Job, Request, noun
-from relume_worker.jobs.job_ledger import JobLedger
-from relume_worker.jobs.step import RunStep, Step
+from relume_worker.jobs.job_service import JobService
+from relume_worker.jobs.step import Step
 from relume_worker.jobs.step_timer import StepTimer
-
-
-class StepHost(Protocol):
-    """Part of the service that a run needs, see `relume_worker.jobs.job_service.JobService`."""
-
-    @property
-    def ledger(self) -> JobLedger: ...
-    @property
-    def run_step(self) -> RunStep: ...
-    @property
-    def is_closing(self) -> bool: ...
-    def num_slots(self) -> int:
-        """Number of bulk steps that run at once."""
-        ...
 
 
 class JobRun(Generic[Request]):
@@ -36,14 +22,14 @@ class JobRun(Generic[Request]):
     """
 
     def __init__(
-        self, host: StepHost, kind: str, job: Job[Request], folder: Path, *, is_first: bool, step_s: float | None
+        self, service: JobService, kind: str, job: Job[Request], folder: Path, *, is_first: bool, step_s: float | None
     ) -> None:
         """
         Args:
-            host: runs the steps. kind: name of its kind. job: state of the job. folder: folder of its files.
+            service: runs the steps. kind: name of its kind. job: state of the job. folder: folder of its files.
             is_first: True if somebody waits for it. step_s: seconds per step of earlier jobs; None if unknown.
         """
-        self._host, self._kind, self._is_first = host, kind, is_first
+        self._service, self._kind, self._is_first = service, kind, is_first
         self.job, self.folder, self.timer = job, folder, StepTimer(step_s)
         self._error: BaseException | None = None  # of the first step that failed
 
@@ -54,13 +40,13 @@ class JobRun(Generic[Request]):
             CancelledError: the job was stopped, deleted or taken over, or the service is closing.
         """
         done = min(done, self.job.total - 1)
-        if self._host.is_closing or not self._host.ledger.update_leased(self.job.id, state="running", done=done):
+        if self._service.is_closing or not self._service.ledger.update_leased(self.job.id, state="running", done=done):
             raise CancelledError(f"the {noun(self._kind)} was stopped")
 
     def is_needed(self) -> bool:
         """True unless the job was stopped, deleted or taken over a moment ago, or the service is closing."""
-        is_over = self._host.is_closing or self._error is not None
-        return not is_over and self._host.ledger.holds_lease(self.job.id)
+        is_over = self._service.is_closing or self._error is not None
+        return not is_over and self._service.ledger.holds_lease(self.job.id)
 
     def step(
         self, kind: str, values: Mapping[str, Any], report: Callable[[float], object] = lambda fraction: None
@@ -70,9 +56,9 @@ class JobRun(Generic[Request]):
         Args:
             kind: kind of the step. values: its arguments. report: called with the fraction done.
         """
-        claim = str(self.folder), self._host.ledger.owner
+        claim = str(self.folder), self._service.ledger.owner
         step = Step(kind, self._is_first, values, claim, self.job.user)
-        return self._host.run_step(step, report, self.is_needed)
+        return self._service.run_step(step, report, self.is_needed)
 
     def timed_step(self, index: int, kind: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
         """Run one of the steps that the job counts.
@@ -99,7 +85,7 @@ class JobRun(Generic[Request]):
         Raises:
             The error of the first step that fails; the others are canceled.
         """
-        with ThreadPoolExecutor(max(1, min(len(values), self._host.num_slots())), "relume-steps") as threads:
+        with ThreadPoolExecutor(max(1, min(len(values), self._service.num_slots())), "relume-steps") as threads:
             futures = [threads.submit(self.timed_step, index, kind, each) for index, each in values.items()]
             try:
                 for num, future in enumerate(as_completed(futures), 1):

@@ -8,63 +8,63 @@ runs the steps, here or on other machines.
 from __future__ import annotations
 
 import logging
-import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any
 
 from sqlalchemy.exc import OperationalError
 
-from relume.core.errors import CancelledError, NotFoundError, RelumeError
+from relume.core.errors import CancelledError, RelumeError
 from relume_worker.database.failures import DatabaseError
-from relume_worker.jobs.claim import claim
+from relume_worker.database.retry import Given, Result, with_retry
 from relume_worker.jobs.fair_share import FairShare, Waiting
 from relume_worker.jobs.job import noun
-from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_ledger import JobLedger
-from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.kind import Kind
 from relume_worker.jobs.step import RunStep
-from relume_worker.jobs.step_timer import StepTimer
-from relume_worker.lease import HEARTBEAT_S, log_lost_lease
+from relume_worker.lease import RENEW_S, log_lost_lease
 
 log = logging.getLogger(__name__)
-POLL_INTERVAL_S = 2.0
-MAX_RUNNING = 64
-MAX_RUNNING_PER_CLIENT = 4
-"""More would only wait for their turns, and could not run on another server; small jobs are not counted."""
+POLL_INTERVAL_S = 1.0
+CLOSE_S = 30.0
 
 
 class JobService:
     """Runs jobs; several services may share a database and a data directory.
 
     Args:
-        ledger: of the jobs. run_step: runs a step in another process. num_slots: bulk steps that run at once.
-        error_text: one sentence about an exception, for the job's row.
-        weights: of clients, see `FairShare`.
+        ledger: of the jobs. weights: of clients, see `FairShare`.
     """
 
-    def __init__(
-        self,
-        ledger: JobLedger,
-        run_step: RunStep,
-        num_slots: Callable[[], int],
-        error_text: Callable[[Exception], str],
-        weights: dict[str, float],
-    ) -> None:
-        self.ledger, self.run_step, self.num_slots, self._error_text = ledger, run_step, num_slots, error_text
-        self._kinds: dict[str, JobKind[Any]] = {}
-        self._fair_share = FairShare(weights)
+    run_step: RunStep
+    num_slots: Callable[[], int]
+    describe: Callable[[Exception], str]
+
+    def __init__(self, ledger: JobLedger, weights: Mapping[str, float]) -> None:
+        self.ledger = ledger
+        self._kinds: dict[str, Kind] = {}
+        self._fair_shares = defaultdict[str, FairShare](lambda: FairShare(weights))  # by lane
         self._wake, self._closing, self._ended = threading.Event(), threading.Event(), threading.Event()
         self._outage = DatabaseError(log, "the queue of jobs cannot be read or written")
-        self._runs: dict[str, tuple[Waiting, threading.Thread, JobRun[Any] | None]] = {}
+        self._run_outage = DatabaseError(log, "a job cannot be recorded")
+        self._runs: dict[str, tuple[Waiting, threading.Thread]] = {}
         self._claimer = threading.Thread(target=self._claim_all, name="relume-jobs", daemon=True)
         self._renewer = threading.Thread(target=self._renew_leases, name="relume-leases", daemon=True)
 
-    def add_kind(self, kind: JobKind[Any]) -> None:
+    def add_kind(self, kind: Kind) -> None:
         """Add a kind of jobs; before `start`."""
         self._kinds[kind.name] = kind
+
+    def use_steps(self, run_step: RunStep, num_slots: Callable[[], int], describe: Callable[[Exception], str]) -> None:
+        """Set what kinds with steps need, before `start`.
+
+        Args:
+            run_step: runs a step in another process. num_slots: number of bulk steps that run at once.
+            describe: returns one sentence about an exception, for the job's row.
+        """
+        self.run_step, self.num_slots, self.describe = run_step, num_slots, describe
 
     def start(self) -> None:
         """Start claiming jobs: queued ones, and those that a dead service left."""
@@ -75,11 +75,13 @@ class JobService:
         """Stop; unfinished jobs resume at the next start."""
         self._closing.set()
         self._wake.set()
-        deadline = time.monotonic() + 30
-        for thread in (self._claimer, *(thread for _, thread, _ in self._runs.copy().values())):
+        deadline = time.monotonic() + CLOSE_S
+        for thread in (self._claimer, *(thread for _, thread in self._runs.copy().values())):
             if thread.is_alive():
                 thread.join(max(0.0, deadline - time.monotonic()))
         self._ended.set()
+        if self._renewer.is_alive():
+            self._renewer.join(1.0)
 
     @property
     def is_closing(self) -> bool:
@@ -89,11 +91,6 @@ class JobService:
     def wake(self) -> None:
         """Look for new jobs now."""
         self._wake.set()
-
-    def timer(self, identity: str) -> StepTimer | None:
-        """Timer of a job that runs here."""
-        run = self._runs.get(identity, (None, None, None))[2]
-        return None if run is None else run.timer
 
     def _claim_all(self) -> None:
         while not self._closing.is_set():
@@ -107,65 +104,88 @@ class JobService:
             self._wake.wait(timeout=POLL_INTERVAL_S)
 
     def _claim_next(self) -> bool:
-        """Claim the next job, and start its thread. False if there is none, or enough are running."""
-        running = self._runs.copy()
-        for waiting in self._fair_share.sort(self.ledger.claimable(frozenset(running))):
-            num_own = sum(run.client == waiting.client and not run.is_first for run, _, _ in running.values())
-            has_room = waiting.is_first or (len(running) < MAX_RUNNING and num_own < MAX_RUNNING_PER_CLIENT)
-            if self._closing.is_set() or not has_room or (row := self.ledger.claim(waiting.id)) is None:
+        """Claim the next job of each lane, and start its thread. False if there is none, or enough are running.
+
+        Raises:
+            The error of a lane; the others continue.
+        """
+        running = [work for work, _ in self._runs.copy().values()]
+        lanes, failure, has_claimed = defaultdict[str, list[Waiting]](list), None, False
+        for work in self.ledger.claimable(self._kinds, {work.id for work in running}):
+            lanes[work.lane].append(work)
+        for lane, waiting in lanes.items():
+            try:
+                has_claimed |= self._claim_in_lane(lane, waiting, [work for work in running if work.lane == lane])
+            except Exception as error:
+                failure = error
+        if failure is not None:
+            raise failure
+        return has_claimed
+
+    def _claim_in_lane(self, lane: str, waiting: Sequence[Waiting], running: Sequence[Waiting]) -> bool:
+        for work in self._fair_shares[lane].sort(waiting):
+            kind = self._kinds[work.kind]
+            if self._closing.is_set() or not kind.has_room(work, running):
                 continue
-            self._fair_share.pick_next(waiting.client)
-            if (kind := self._kinds.get(row.kind)) is None:  # of a newer version
-                self.ledger.release(row.id)
-                continue
-            thread = threading.Thread(target=self._run, args=(kind, waiting), name=f"relume-{row.kind}", daemon=True)
-            self._runs[row.id] = waiting, thread, None
+            try:
+                if not self.ledger.claim(work.id):
+                    continue
+            except Exception as error:
+                kind.on_blocked(work.id, error)
+                raise
+            self._fair_shares[lane].pick_next(work.client)
+            thread = threading.Thread(target=self._run, args=(kind, work), name=f"relume-{kind.name}", daemon=True)
+            self._runs[work.id] = work, thread
             thread.start()
             return True
         return False
 
-    def _run(self, kind: JobKind[Any], waiting: Waiting) -> None:
+    def _run(self, kind: Kind, work: Waiting) -> None:
         """Run one job; every error ends up in its row as a sentence."""
         try:
-            with suppress(NotFoundError):  # deleted in the meantime
-                job = kind.get(waiting.id)
-                is_first, step_s = kind.is_first(job.request), kind.step_s(job.request)
-                run: JobRun[Any] = JobRun(self, kind.name, job, kind.folder / job.id, is_first=is_first, step_s=step_s)
-                self._runs[waiting.id] = waiting, threading.current_thread(), run
-                self._run_steps(kind, run)
-        except Exception as error:  # the database is unavailable: the job is claimed again, and finds its results
-            self._outage.report_failure(error)
+            self._perform(kind, work)
+            self._run_outage.report_recovered()
+        except Exception as error:  # of the database: the job is claimed again, and finds its results
+            self._run_outage.report_failure(error)
+            with suppress(Exception):  # perhaps it cannot be read, either
+                kind.on_blocked(work.id, error)
+            self._closing.wait(POLL_INTERVAL_S)
         finally:
-            del self._runs[waiting.id]
+            del self._runs[work.id]
             self._wake.set()
 
-    def _run_steps(self, kind: JobKind[Any], run: JobRun[Any]) -> None:
-        job, ledger = run.job, self.ledger
+    def _perform(self, kind: Kind, work: Waiting) -> None:
+        identity, ledger = work.id, self.ledger
         try:
-            kind.check_readable(job)
-            run.folder.mkdir(parents=True, exist_ok=True)
-            claim(run.folder, ledger.owner)
-            kind.run(run)
-            if ledger.update_leased(job.id, done=job.total, state="ready", ended=time.time()):
-                kind.on_ready(job)
-        except CancelledError:  # closing, stopped, deleted, or taken over
+            columns = kind.perform(work)
+            if self._call(ledger.finish, identity, "ready", **columns):
+                kind.on_ready(identity)
+        except CancelledError:  # closing, canceled, deleted, or taken over
             pass
         except OperationalError:
             raise
-        except Exception as error:
-            if not isinstance(error, RelumeError | OSError):
-                log.exception("%s %s failed", noun(kind.name), job.id, extra={"fields": {kind.name: job.id}})
-            if ledger.update_leased(job.id, state="failed", problem=self._error_text(error), ended=time.time()):
-                kind.on_failed(job)
+        except Exception as error:  # a defect must not end the service
+            if self._call(ledger.exists, identity):  # otherwise deleted meanwhile, with its files
+                self._fail(kind, identity, error)
         finally:
-            has_lease = ledger.release(job.id)
-        if not ledger.exists(job.id):
-            shutil.rmtree(run.folder, ignore_errors=True)
+            has_lease = self._call(ledger.release, identity)
+        if not has_lease and self._call(ledger.exists, identity):
+            log_lost_lease(noun(kind.name), identity)
         elif not has_lease:
-            log_lost_lease(noun(kind.name), job.id)
+            kind.on_deleted(identity)
+
+    def _fail(self, kind: Kind, identity: str, error: Exception) -> None:
+        if not isinstance(error, RelumeError | OSError):
+            log.exception("%s %s failed", noun(kind.name), identity, extra={"fields": {kind.name: identity}})
+        if self._call(self.ledger.finish, identity, "failed", problem=kind.error_text(identity, error)):
+            kind.on_failed(identity)
+
+    def _call(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
+        """Call the ledger; an outage delays a job, and does not end it."""
+        return with_retry(self._closing.is_set, call, *args, **kwargs)
 
     def _renew_leases(self) -> None:
-        while not self._ended.wait(HEARTBEAT_S):
+        while not self._ended.wait(RENEW_S):
             try:
                 if self._runs:
                     self.ledger.renew_leases()
