@@ -38,7 +38,7 @@ class _TwoLobes(_Sided):
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
         bs = mi.BSDFSample3f()
-        bs.wo = self._drawn(si.wi, sample1, sample2)
+        bs.wo = self._sample_direction(si.wi, sample1, sample2)
         bs.pdf = self.pdf(ctx, si, bs.wo, active)
         bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
         bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
@@ -91,7 +91,7 @@ class LambertCookTorrance(_TwoLobes):
     def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
         h, _ = self._facets().sample(wi, direction_sample)
         return dr.select(
-            lobe_sample < 0.5, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.has_indirect(wi, h)
+            lobe_sample < 0.5, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.reflect(wi, h)
         )
 
 
@@ -122,7 +122,7 @@ class LambertBlinnPhong(_TwoLobes):
         sin_h, phi = dr.safe_sqrt(1 - cos_h * cos_h), 2 * dr.pi * direction_sample.y
         h = mi.Vector3f(sin_h * dr.cos(phi), sin_h * dr.sin(phi), cos_h)
         return dr.select(
-            lobe_sample < self.diffuse, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.has_indirect(wi, h)
+            lobe_sample < self.diffuse, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.reflect(wi, h)
         )
 
 
@@ -143,7 +143,7 @@ class _MirrorOverDiffuse(_Sided):
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
         bs, is_mirror = mi.BSDFSample3f(), sample1 < self.diffuse_probability
-        bs.wo = dr.select(is_mirror, mi.has_indirect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
+        bs.wo = dr.select(is_mirror, mi.reflect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
         bs.pdf = dr.select(is_mirror, self.diffuse_probability, self.pdf(ctx, si, bs.wo, active))
         bs.eta, bs.sampled_component = 1.0, dr.select(is_mirror, mi.UInt32(1), mi.UInt32(0))
         types = (mi.UInt32(+mi.BSDFFlags.DeltaReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection))
