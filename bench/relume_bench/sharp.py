@@ -1,0 +1,198 @@
+"""sharp.rmse_R, sharp.speckle_R, sharp.rmse_plastic_R: a polished teapot in the still life against Mitsuba.
+
+The teapot is a GGX metal of roughness R, or plastic: a GGX coat over a diffuse base. Method `gather`, all light, exact
+image of 640×480. Error: both images averaged over 2 × 2 pixels, Mitsuba's noise removed; the context has that of the
+teapot's pixels, `inside`, and of the others, with their bias. Speckle: 99.9th percentile of |pixel − median of 3 × 3|
+after the default look's tone mapping, over the teapot and two pixels around it, ours ÷ Mitsuba's. Mitsuba renders few
+paths a pixel of the whole image, and many of the teapot: `spp` in the context. Its images are stored
+(`relume_bench.mitsuba.cached_passes`).
+"""
+
+from __future__ import annotations
+
+import atexit
+import copy
+import tempfile
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, median_filter
+
+from relume.brdf.registry import TERMS
+from relume.core.cache import Cache
+from relume.image_io.tone_mapping import tone_map
+from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
+from relume.look import Look, validate
+from relume.look.document import MAX_BOUNCES
+from relume.output.render_image import render_image
+from relume.scene.examples.catalog import built_in
+from relume.scene.model import Scene
+from relume.store.bake_protocol import Recipe
+from relume_bench.figure import Figure, skipped
+from relume_bench.gather import bake
+from relume_bench.indirect import PASSES
+from relume_bench.mitsuba import averaged, bsdf, cached_passes, missing
+from relume_bench.standard_error import compare_pixels, compare_with_passes
+
+F32 = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+VIEW, MATERIAL = "front", "Teapot"
+ROUGHNESSES = (0.02, 0.05, 0.1, 0.2, 0.3)
+FINER = 2  # pixels that are averaged along each side
+UNIT = "relative RMSE"
+_METAL_F0 = [0.95, 0.90, 0.80]
+_BASE = [0.24, 0.016, 0.012]
+_MARGIN, _BLOCK = 2, 16  # pixels around the teapot; side of blocks of pixels
+_PERCENTILE = 99.9
+_RR_DEPTH = 3  # russian roulette from this depth
+
+
+class Sizes(NamedTuple):
+    """Width and height of images; lights of bakes; Mitsuba's paths a pixel and pass, of the whole and of the teapot."""
+
+    size: tuple[int, int]
+    lights: int
+    spp: int
+    detail_spp: int
+
+    @classmethod
+    def choose(cls, tiny: bool) -> Sizes:
+        """The measured sizes, or with `tiny` those of a trial run."""
+        return cls((40, 30), 60, 1, 2) if tiny else cls((640, 480), 2000, 16, 56)
+
+
+def measure(tiny: bool, kind: str = "metal", roughness: float = 0.1) -> list[Figure]:
+    """Measure one material, "metal" or "plastic". The bake is made once in a process."""
+    names = (f"sharp.rmse_{roughness}", f"sharp.speckle_{roughness}")
+    names = names if kind == "metal" else (f"sharp.rmse_plastic_{roughness}",)
+    if (why := missing()) is not None:
+        return skipped(names, UNIT, why)
+    transfer, pot = open_still_life(tiny), find_teapot(tiny)
+    look = make_look(transfer.default_look, kind, roughness)
+    image, passes = render_image(transfer, VIEW, look), teapot_passes(kind, roughness, tiny)
+    ratios = np.array([measure_speckle(picture, pot, look) for picture in (image, passes.mean(axis=0))])
+    figures = [compare_images(names[0], image, passes, pot, describe(kind, roughness, tiny))]
+    if kind == "metal":
+        context = {"ours": ratios[0], "mitsuba": ratios[1], **describe(kind, roughness, tiny)}
+        figures.append(Figure(names[1], float(ratios[0] / ratios[1]), "ratio", context))
+    return figures
+
+
+@cache
+def open_still_life(tiny: bool) -> FixedViewTransfer:
+    """The still life, baked for a fixed camera with its own materials."""
+    sizes, folder = Sizes.choose(tiny), tempfile.TemporaryDirectory()
+    atexit.register(folder.cleanup)
+    recipe, path = Recipe("gather", (VIEW,), sizes.size, sizes.lights), Path(folder.name) / "gather.zarr"
+    return open_transfer(bake(built_in("still_life"), recipe, path).path, Cache(4 << 30))
+
+
+def find_teapot(tiny: bool) -> Mask:
+    """Pixels of the teapot. (height, width)"""
+    transfer = open_still_life(tiny)
+    return np.asarray(transfer.views[VIEW].material_ids() == transfer.material_names.index(MATERIAL))
+
+
+def make_terms(kind: str, roughness: float) -> list[dict[str, Any]]:
+    """Terms of the teapot."""
+    f0 = _METAL_F0 if kind == "metal" else 0.04
+    gloss = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": roughness, "f0": f0}, "texture": None}
+    base = [] if kind == "metal" else [{"model": "lambert", "color": _BASE, "texture": None}]
+    return [*base, gloss]
+
+
+def allowed(roughness: float) -> float:
+    """The nearest roughness that looks allow."""
+    return max(roughness, TERMS["ggx"].parameter("roughness").minimum)
+
+
+def make_look(default: Mapping[str, Any], kind: str, roughness: float) -> Look:
+    """The default look with another teapot, as sharp as looks allow."""
+    document = copy.deepcopy(dict(default))
+    document["materials"][MATERIAL]["terms"] = make_terms(kind, allowed(roughness))
+    return validate(document, default)
+
+
+def describe(kind: str, roughness: float, tiny: bool) -> dict[str, Any]:
+    """Context of all figures of a material."""
+    sizes = Sizes.choose(tiny)
+    return {
+        "kind": kind, "our_roughness": allowed(roughness), "size": list(sizes.size), "lights": sizes.lights,
+        "spp": PASSES * sizes.spp, "teapot_spp": PASSES * sizes.detail_spp,
+    }  # fmt: skip
+
+
+def teapot_passes(kind: str, roughness: float, tiny: bool) -> F32:
+    """Mitsuba's independent images, with more paths for the teapot. (passes, height, width, 3)"""
+    scene, sizes = built_in("still_life"), Sizes.choose(tiny)
+    bsdfs, wood = [_describe_material(scene, mesh.material, kind, roughness) for mesh in scene.meshes], _wood(scene)
+    rows, columns = _bound(find_teapot(tiny))
+    crop = [columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start]
+    job = make_job(bsdfs)
+    passes = cached_passes(scene, sizes.size, {**job, "spp": [sizes.spp]}, wood)
+    detail = {**job, "spp": [sizes.detail_spp], "crop": crop}
+    passes[:, rows, columns] = cached_passes(scene, sizes.size, detail, wood)
+    return passes
+
+
+def _bound(mask: Mask) -> tuple[slice, slice]:
+    """Rows and columns around a mask, in whole blocks of pixels, so that a sample more does not change them."""
+    padded = binary_dilation(mask, iterations=_MARGIN)
+    bounds = []
+    for num, hits in zip(mask.shape, np.nonzero(padded), strict=True):
+        start, stop = int(hits.min()) // _BLOCK * _BLOCK, -(-int(hits.max() + 1) // _BLOCK) * _BLOCK
+        bounds.append(slice(start, min(stop, num)))
+    return bounds[0], bounds[1]
+
+
+def make_job(bsdfs: list[dict[str, Any]]) -> dict[str, Any]:
+    """Job for Mitsuba's path tracer, without counts; pixels are stratified, because highlights vary within them."""
+    return {
+        "passes": PASSES, "bsdfs": bsdfs, "sampler": "multijitter", "most": 64,
+        "integrator": {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": _RR_DEPTH},
+    }  # fmt: skip
+
+
+def _wood(scene: Scene) -> dict[str, F32]:
+    tray = next(material for material in scene.materials if material.name == "Tray")
+    return {"wood": tray.textures["diffuse"].pixels}
+
+
+def _describe_material(scene: Scene, index: int, kind: str, roughness: float) -> dict[str, Any]:
+    material = scene.materials[index]
+    if material.name == MATERIAL:
+        return bsdf(make_terms(kind, allowed(roughness))) | {"roughness": roughness}
+    return bsdf(material.terms) | ({"albedo": {"array": "wood"}} if material.name == "Tray" else {})
+
+
+def compare_images(figure: str, image: F32, passes: F32, mask: Mask, details: Mapping[str, Any]) -> Figure:
+    """Figure of the error of an image, averaged over small blocks of pixels.
+
+    Args:
+        figure: its name. image: ours, (height, width, 3). passes: Mitsuba's, (passes, height, width, 3).
+        mask: pixels whose error is in the context, beside that of the others. (height, width)
+        details: further context.
+    """
+    coarse = np.array([averaged(picture, FINER) for picture in passes], np.float32)
+    rendered, height, width = averaged(image, FINER), len(image) // FINER, image.shape[1] // FINER
+    inside = mask.reshape(height, FINER, width, FINER).any(axis=(1, 3))
+    whole = compare_with_passes(rendered, coarse)
+    summaries = {
+        name: compare_pixels(rendered, coarse, pixels).summary
+        for name, pixels in (("inside", inside), ("outside", ~inside))
+    }
+    context = {**whole.context, **summaries, **details}
+    return Figure(figure, whole.error.value, UNIT, context, whole.error.standard_error)
+
+
+def measure_speckle(image: NDArray[np.floating], mask: Mask, look: Look) -> float:
+    """99.9th percentile of |pixel − median of 3 × 3| of display values around a mask."""
+    display = tone_map(np.asarray(image, np.float32), look.display.exposure, look.display.tone_map)
+    deviation = np.abs(display - median_filter(display, size=(3, 3, 1)))
+    return float(np.percentile(deviation[binary_dilation(mask, iterations=_MARGIN)], _PERCENTILE))
