@@ -38,7 +38,7 @@ from relume_bench.figure import Figure, skipped
 from relume_bench.gather import bake
 from relume_bench.indirect import PASSES
 from relume_bench.mitsuba import averaged, bsdf, cached_passes, missing
-from relume_bench.standard_error import compare_pixels, compare_with_passes
+from relume_bench.standard_error import compare_pixels
 
 F32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -108,10 +108,16 @@ def _compare_speckle(figure: str, displayed: Sequence[F32], pot: Mask, details: 
 @cache
 def open_still_life(tiny: bool) -> FixedViewTransfer:
     """The still life, baked for a fixed camera with its own materials."""
-    sizes, folder = Sizes.choose(tiny), tempfile.TemporaryDirectory()
+    folder = tempfile.TemporaryDirectory()
     atexit.register(folder.cleanup)
-    recipe, path = Recipe("gather", (VIEW,), sizes.size, sizes.lights), Path(folder.name) / "gather.zarr"
-    return open_transfer(bake(built_in("still_life"), recipe, path).path, Cache(4 << 30))
+    return bake_and_open(built_in("still_life"), tiny, Path(folder.name))
+
+
+def bake_and_open(scene: Scene, tiny: bool, folder: Path) -> FixedViewTransfer:
+    """A scene, baked for its fixed camera `VIEW` in a folder."""
+    sizes = Sizes.choose(tiny)
+    recipe = Recipe("gather", (VIEW,), sizes.size, sizes.lights)
+    return open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
 
 
 def find_teapot(tiny: bool) -> Mask:
@@ -192,22 +198,24 @@ def _describe_material(scene: Scene, index: int, kind: str, roughness: float) ->
     return bsdf(material.terms) | ({"albedo": {"array": "wood"}} if material.name == "Tray" else {})
 
 
-def compare_images(figure: str, image: F32, passes: F32, mask: Mask, details: Mapping[str, Any]) -> Figure:
+def compare_images(
+    figure: str, image: F32, passes: F32, mask: Mask, details: Mapping[str, Any], pixels: str = "whole"
+) -> Figure:
     """Figure of the error of an image, averaged over small blocks of pixels.
 
     Args:
         figure: its name. image: ours, (height, width, 3). passes: Mitsuba's, (passes, height, width, 3).
-        mask: pixels whose error is in the context, beside that of the others. (height, width)
-        details: further context.
+        mask: pixels "inside"; the others are "outside". (height, width)
+        details: further context. pixels: "whole", "inside" or "outside": those of the value; all are in the context.
     """
     coarse = np.array([averaged(picture, FINER) for picture in passes], np.float32)
     rendered, height, width = averaged(image, FINER), len(image) // FINER, image.shape[1] // FINER
     inside = mask.reshape(height, FINER, width, FINER).any(axis=(1, 3))
-    whole = compare_with_passes(rendered, coarse)
-    summaries = {
-        name: compare_pixels(rendered, coarse, pixels).summary
-        for name, pixels in (("inside", inside), ("outside", ~inside))
-    }
+    masks = {"whole": inside | True, "inside": inside, "outside": ~inside}
+    comparisons = {name: compare_pixels(rendered, coarse, mask) for name, mask in masks.items()}
     clipped = compare_pixels(np.minimum(rendered, _BRIGHT), np.minimum(coarse, _BRIGHT), inside).summary
-    context = {**whole.context, **summaries, "clipped": clipped, **details}
-    return Figure(figure, whole.error.value, UNIT, context, whole.error.standard_error)
+    summaries = {name: comparison.summary for name, comparison in comparisons.items()}
+    error, context = comparisons[pixels].error, comparisons[pixels].context
+    return Figure(
+        figure, error.value, UNIT, {**context, **summaries, "clipped": clipped, **details}, error.standard_error
+    )
