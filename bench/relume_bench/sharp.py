@@ -70,23 +70,20 @@ class Sizes(NamedTuple):
 
 def measure(tiny: bool, kind: str = "metal", roughness: float = 0.1) -> list[Figure]:
     """Measure one material, "metal" or "plastic". The bake is made once in a process."""
-    names = (f"sharp.rmse_{roughness}", f"sharp.speckle_{roughness}")
-    names = names if kind == "metal" else (f"sharp.rmse_plastic_{roughness}",)
+    is_metal = kind == "metal"
+    name = f"sharp.rmse_{roughness}" if is_metal else f"sharp.rmse_{kind}_{roughness}"
+    speckle_names = (f"sharp.speckle_{roughness}",) if is_metal else ()
     if (why := missing()) is not None:
-        return skipped(names, UNIT, why)
+        return [*skipped((name,), UNIT, why), *skipped(speckle_names, "ratio", why)]
     transfer, pot = open_still_life(tiny), find_teapot(tiny)
     look = make_look(transfer.default_look, kind, roughness)
     image, passes = render_image(transfer, VIEW, look), teapot_passes(kind, roughness, tiny)
     mean = np.asarray(passes.mean(axis=0), np.float32)
     displayed = [tone_map(picture, look.display.exposure, look.display.tone_map) for picture in (image, mean)]
-    details = {
-        **describe(kind, roughness, tiny),
-        "display_rms": float(np.sqrt(np.mean((displayed[0] - displayed[1])[pot] ** 2))),
-    }
-    figures = [compare_images(names[0], image, passes, pot, details)]
-    if kind == "metal":
-        figures.append(_compare_speckle(names[1], displayed, pot, describe(kind, roughness, tiny)))
-    return figures
+    details = describe(kind, roughness, tiny)
+    display_rms = float(np.sqrt(np.mean((displayed[0] - displayed[1])[pot] ** 2)))
+    error = compare_images(name, image, passes, pot, {**details, "display_rms": display_rms})
+    return [error, *(_compare_speckle(speckle, displayed, pot, details) for speckle in speckle_names)]
 
 
 def _compare_speckle(figure: str, displayed: Sequence[F32], pot: Mask, details: Mapping[str, Any]) -> Figure:
@@ -210,7 +207,7 @@ def compare_images(
     """
     coarse = np.array([averaged(picture, FINER) for picture in passes], np.float32)
     rendered, height, width = averaged(image, FINER), len(image) // FINER, image.shape[1] // FINER
-    inside = mask.reshape(height, FINER, width, FINER).any(axis=(1, 3))
+    inside: Mask = np.asarray(mask.reshape(height, FINER, width, FINER).any(axis=(1, 3)))
     masks = {"whole": inside | True, "inside": inside, "outside": ~inside}
     comparisons = {name: compare_pixels(rendered, coarse, mask) for name, mask in masks.items()}
     clipped = compare_pixels(np.minimum(rendered, _BRIGHT), np.minimum(coarse, _BRIGHT), inside).summary
