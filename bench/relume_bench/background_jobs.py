@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 
 
@@ -18,7 +19,7 @@ class BackgroundJobs:
         lags_s: for each frame, the age of the look whose indirect light it shows.
     """
 
-    def __init__(self, picture: FreeCameraPicture) -> None:
+    def __init__(self, picture: FreeCameraPicture | Picture) -> None:
         self._picture, self._thread = picture, ThreadPoolExecutor(1)
         self._running: tuple[Any, Future[Any], float] | None = None
         self._requested_s = self._displayed_request_s = time.perf_counter()

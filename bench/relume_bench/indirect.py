@@ -68,7 +68,7 @@ def reflected_by_mitsuba(
     spp: int,
     folder: Path,
 ) -> F32:
-    """Independent passes of Mitsuba's image of the same light. (`GLASS_RULE`, height, width, 3)
+    """Independent passes of Mitsuba's image of the same light. (`PASSES`, height, width, 3)
 
     Args:
         scene: its first view is rendered.

@@ -26,7 +26,7 @@ from relume_bench.figure import Figure, skipped
 from relume_bench.gather import bake
 from relume_bench.indirect import PASSES
 from relume_bench.mitsuba import averaged, missing, read_passes, render
-from relume_bench.standard_error import NoiseCorrectedError, compare_with_passes
+from relume_bench.standard_error import compare_pixels
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -48,7 +48,7 @@ def measure(tiny: bool) -> list[Figure]:
         rendered, is_ball = _render_relume(scene, size, lights, Path(folder))
         reference_passes = _render_mitsuba(scene, size, spp, Path(folder))
     whole, balls, background = (
-        _compare_pixels(rendered, reference_passes, mask) for mask in (is_ball | True, is_ball, ~is_ball)
+        compare_pixels(rendered, reference_passes, mask) for mask in (is_ball | True, is_ball, ~is_ball)
     )
     details = {"size": list(size), "spp": PASSES * spp, "lights": lights}
     return [
@@ -61,11 +61,6 @@ def measure(tiny: bool) -> list[Figure]:
         )
         for name, comparison, more in zip(_NAMES, (whole, balls), ({"background": background.summary}, {}), strict=True)
     ]
-
-
-def _compare_pixels(rendered: F64, reference_passes: F32, mask: NDArray[np.bool_]) -> NoiseCorrectedError:
-    """Compare some pixels, as if they were a row."""
-    return compare_with_passes(rendered[mask][None], reference_passes[:, mask][:, None])
 
 
 def mirror_room() -> Scene:

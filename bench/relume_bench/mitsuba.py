@@ -9,14 +9,17 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformdirs
 from numpy.typing import NDArray
 
 from relume.brdf.term_validation import complete_term
+from relume.core.digest import digest
 from relume.scene.model import Scene
 
 F32 = NDArray[np.float32]
@@ -49,7 +52,7 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Terms of a material as a plugin of peer_mitsuba_plugins.py.
 
     Args:
-        terms: `lambert` terms, and at most one `blinn_phong` or dielectric `cook_torrance`; textures are ignored.
+        terms: `lambert` terms and at most one `blinn_phong`, `ggx` or dielectric `cook_torrance`; without textures.
     """
     whole = [complete_term(("mitsuba",), term, None) for term in terms]
     diffuse = np.sum([term["color"] for term in whole if term["model"] == "lambert"] or [[0.0] * 3], axis=0).tolist()
@@ -59,6 +62,12 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         return {
             "type": "lambert_cook_torrance", "albedo": diffuse, "gain": lobes[0]["color"],
             "sigma": params["sigma"], "ior": params["ior"],
+        }  # fmt: skip
+    if lobes and lobes[0]["model"] == "ggx":
+        params = lobes[0]["params"]
+        return {
+            "type": "lambert_ggx", "albedo": diffuse, "gain": lobes[0]["color"], "roughness": params["roughness"],
+            "f0": np.broadcast_to(params["f0"], 3).tolist(), "diffuse_share": 0.5 if any(diffuse) else 0.0,
         }  # fmt: skip
     glossy, exponent = (lobes[0]["color"], lobes[0]["params"]["exponent"]) if lobes else ([0.0] * 3, 1.0)
     # a highlight reflects up to four times its color
@@ -91,6 +100,28 @@ def read_passes(folder: Path) -> F32:
     return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
 
 
+def cached_passes(
+    scene: Scene, size: tuple[int, int], job: Mapping[str, Any], images: Mapping[str, F32] | None = None
+) -> F32:
+    """Independent images of a job, rendered once for each scene, job and version of the peer's scripts.
+
+    They are stored in the folder `peers` of the user's cache, which may be removed.
+
+    Args:
+        scene, size, job, images: as for `render`; images are of the scene's textures.
+    Returns:
+        (passes, height, width, 3).
+    """
+    scripts = [Path(__file__).with_name(f"peer_mitsuba_{name}.py").read_bytes() for name in ("plugins", "render")]
+    cached = platformdirs.user_cache_path("relume") / "peers" / f"{digest((scene.id, size, job, scripts))}.npy"
+    if not cached.is_file():
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=cached.parent) as folder:
+            render(scene, size, job, Path(folder), images)
+            (Path(folder) / "passes.npy").replace(cached)
+    return np.asarray(np.load(cached, allow_pickle=False), np.float32)
+
+
 def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
     """Average an image with `finer` times as many pixels per side as the peer's. (h, w, 3) float64"""
     height, width, _ = fine.shape
@@ -105,7 +136,8 @@ def render(
 
     Args:
         scene: to render. size: width and height, pixels.
-        job: "spp", sample counts; "bsdfs", one per mesh; "passes" for independent passes; "bounces" and "seen" for
+        job: "spp", sample counts; "bsdfs", one per mesh; "passes" for independent passes; "crop", x, y, width and
+            height of a part; "sampler", name of a plugin; "most", maximum count at once; "bounces" and "seen" for
             indirect light alone (peer_mitsuba_render.py); "integrator" for more than direct light; "emitters", lights
             besides the map; both are Mitsuba's own descriptions.
         folder: for exchanged files.

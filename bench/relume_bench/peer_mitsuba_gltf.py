@@ -163,7 +163,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
             alpha = dr.maximum(t.coat_rough * t.coat_rough, _LEAST_ALPHA)
             film, _ = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, alpha, True).sample(wi, sample2)
             h = dr.select(sample1 < diffuse + glossy, h, film)
-        wo = dr.select(sample1 < diffuse, mi.warp.square_to_cosine_hemisphere(sample2), mi.has_indirect(wi, h))
+        wo = dr.select(sample1 < diffuse, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(wi, h))
         bs = mi.BSDFSample3f()
         bs.wo = t.frame.to_world(wo)
         bs.pdf = dr.select(self._is_same_side(si.wi, wi, bs.wo, wo, active), self._density(t, wi, wo), 0)

@@ -26,19 +26,23 @@ class _Sided(mi.BSDF):  # type: ignore[misc]
 
 
 class _TwoLobes(_Sided):
-    """A diffuse and a glossy lobe. A subclass has, with `wo` toward the light in Mitsuba's convention,
+    """A diffuse and a glossy lobe, with properties "albedo", a color or a texture, and "gain".
 
-    `_value(wi, wo)`, BRDF times the cosine; `_sample_direction(wi, lobe_sample, direction_sample)`, a direction from
-    numbers in [0, 1), and `_density(wi, wo)`, its density, 1/sr.
+    A subclass has, with `wo` toward the light in Mitsuba's convention, `_glossy(wi, wo)`, the glossy BRDF times the
+    cosine; `_sample_direction(wi, lobe_sample, direction_sample)`, a direction from numbers in [0, 1), and
+    `_density(wi, wo)`, its density, 1/sr.
     """
 
     def __init__(self, props: Any) -> None:
         super().__init__(props, mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
+        albedo = props["albedo"]
+        self.albedo = albedo if isinstance(albedo, mi.Texture) else mi.Color3f(albedo)
+        self.gain = mi.Color3f(props["gain"])
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
         bs = mi.BSDFSample3f()
-        bs.wo = self._drawn(si.wi, sample1, sample2)
+        bs.wo = self._sample_direction(si.wi, sample1, sample2)
         bs.pdf = self.pdf(ctx, si, bs.wo, active)
         bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
         bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
@@ -47,7 +51,10 @@ class _TwoLobes(_Sided):
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
-        return dr.select(_above(si.wi, wo, active), mi.Color3f(self._value(si.wi, wo)), 0)
+        is_texture = isinstance(self.albedo, mi.Texture)
+        albedo = mi.Color3f(self.albedo.eval_3(si, active)) if is_texture else self.albedo
+        value = albedo / dr.pi * mi.Frame3f.cos_theta(wo) + self.gain * self._glossy(si.wi, wo)
+        return dr.select(_above(si.wi, wo, active), mi.Color3f(value), 0)
 
     def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""
@@ -66,13 +73,12 @@ class LambertCookTorrance(_TwoLobes):
 
     def __init__(self, props: Any) -> None:
         super().__init__(props)
-        self.albedo, self.gain = mi.Color3f(props["albedo"]), mi.Color3f(props["gain"])
         self.sigma, self.ior = float(props["sigma"]), float(props["ior"])
 
     def _facets(self) -> Any:
         return mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, self.sigma, sample_visible=False)
 
-    def _value(self, wi: Any, wo: Any) -> Any:
+    def _glossy(self, wi: Any, wo: Any) -> Any:
         h = dr.normalize(wi + wo)
         cos_h, cos_d = mi.Frame3f.cos_theta(h), dr.maximum(dr.dot(h, wi), 1e-6)
         cos_o, cos_i = mi.Frame3f.cos_theta(wi), mi.Frame3f.cos_theta(wo)
@@ -80,8 +86,7 @@ class LambertCookTorrance(_TwoLobes):
         facets = dr.exp(-(1 - cos2) / (cos2 * self.sigma**2)) / (self.sigma**2 * cos2 * cos2)
         masking = dr.minimum(1, 2 * cos_h * dr.minimum(cos_i, cos_o) / cos_d)
         fresnel = mi.fresnel(cos_d, self.ior)[0]
-        glossy = facets * fresnel * masking / (4 * dr.pi * cos_o)
-        return self.albedo / dr.pi * cos_i + self.gain * glossy
+        return facets * fresnel * masking / (4 * dr.pi * cos_o)
 
     def _density(self, wi: Any, wo: Any) -> Any:
         h = dr.normalize(wi + wo)
@@ -90,9 +95,7 @@ class LambertCookTorrance(_TwoLobes):
 
     def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
         h, _ = self._facets().sample(wi, direction_sample)
-        return dr.select(
-            lobe_sample < 0.5, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.has_indirect(wi, h)
-        )
+        return dr.select(lobe_sample < 0.5, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.reflect(wi, h))
 
 
 mi.register_bsdf("lambert_cook_torrance", lambda props: LambertCookTorrance(props))
@@ -103,13 +106,11 @@ class LambertBlinnPhong(_TwoLobes):
 
     def __init__(self, props: Any) -> None:
         super().__init__(props)
-        self.albedo, self.gain = mi.Color3f(props["albedo"]), mi.Color3f(props["gain"])
         self.exponent, self.diffuse = float(props["exponent"]), float(props["diffuse_share"])
 
-    def _value(self, wi: Any, wo: Any) -> Any:
+    def _glossy(self, wi: Any, wo: Any) -> Any:
         cos_i, cos_h = mi.Frame3f.cos_theta(wo), mi.Frame3f.cos_theta(dr.normalize(wi + wo))
-        lobe = (self.exponent + 2) / (2 * dr.pi) * dr.power(dr.maximum(cos_h, 0), self.exponent)
-        return cos_i * (self.albedo / dr.pi + self.gain * lobe)
+        return cos_i * (self.exponent + 2) / (2 * dr.pi) * dr.power(dr.maximum(cos_h, 0), self.exponent)
 
     def _density(self, wi: Any, wo: Any) -> Any:
         h = dr.normalize(wi + wo)
@@ -122,11 +123,44 @@ class LambertBlinnPhong(_TwoLobes):
         sin_h, phi = dr.safe_sqrt(1 - cos_h * cos_h), 2 * dr.pi * direction_sample.y
         h = mi.Vector3f(sin_h * dr.cos(phi), sin_h * dr.sin(phi), cos_h)
         return dr.select(
-            lobe_sample < self.diffuse, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.has_indirect(wi, h)
+            lobe_sample < self.diffuse, mi.warp.square_to_cosine_hemisphere(direction_sample), mi.reflect(wi, h)
         )
 
 
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
+
+
+class LambertGgx(_TwoLobes):
+    """albedo/π + gain D F G1(wi) G1(wo) / (4 cos θi cos θo): GGX facets, Schlick's reflectance from f0.
+
+    Samples visible facets; the cosine with the probability `diffuse_share`.
+    """
+
+    def __init__(self, props: Any) -> None:
+        super().__init__(props)
+        self.f0, self.alpha = mi.Color3f(props["f0"]), float(props["roughness"]) ** 2
+        self.diffuse = float(props["diffuse_share"])
+
+    def _facets(self) -> Any:
+        return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, sample_visible=True)
+
+    def _glossy(self, wi: Any, wo: Any) -> Any:
+        h, facets = dr.normalize(wi + wo), self._facets()
+        fresnel = self.f0 + (1 - self.f0) * (1 - dr.maximum(dr.dot(h, wi), 0)) ** 5
+        return facets.eval(h) * facets.G(wi, wo, h) * fresnel / (4 * mi.Frame3f.cos_theta(wi))
+
+    def _density(self, wi: Any, wo: Any) -> Any:
+        h = dr.normalize(wi + wo)
+        facets = self._facets().pdf(wi, h) / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
+        return dr.lerp(facets, mi.warp.square_to_cosine_hemisphere_pdf(wo), self.diffuse)
+
+    def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
+        h, _ = self._facets().sample(wi, direction_sample)
+        cosine = mi.warp.square_to_cosine_hemisphere(direction_sample)
+        return dr.select(lobe_sample < self.diffuse, cosine, mi.reflect(wi, h))
+
+
+mi.register_bsdf("lambert_ggx", lambda props: LambertGgx(props))
 
 
 class _MirrorOverDiffuse(_Sided):
@@ -143,7 +177,7 @@ class _MirrorOverDiffuse(_Sided):
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """Mitsuba's interface."""
         bs, is_mirror = mi.BSDFSample3f(), sample1 < self.diffuse_probability
-        bs.wo = dr.select(is_mirror, mi.has_indirect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
+        bs.wo = dr.select(is_mirror, mi.reflect(si.wi), mi.warp.square_to_cosine_hemisphere(sample2))
         bs.pdf = dr.select(is_mirror, self.diffuse_probability, self.pdf(ctx, si, bs.wo, active))
         bs.eta, bs.sampled_component = 1.0, dr.select(is_mirror, mi.UInt32(1), mi.UInt32(0))
         types = (mi.UInt32(+mi.BSDFFlags.DeltaReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection))

@@ -21,6 +21,8 @@ sys.path.append(str(Path(__file__).parent))  # the interpreter is isolated
 plugins: Any = __import__("peer_mitsuba_plugins")
 __import__("peer_mitsuba_gltf")
 
+_CROP = ("crop_offset_x", "crop_offset_y", "crop_width", "crop_height")
+
 
 def resolve_description(arrays: Any, value: Any) -> Any:
     """Resolve the images of a description.
@@ -81,7 +83,7 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
 
     Args:
         folder: folder of scene.npz.
-        job: content of job.json: size, camera, emitters, integrator, by default of direct light.
+        job: content of job.json: size, "crop", sampler, camera, emitters, integrator, by default of direct light.
         bsdfs: descriptions, one per mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
@@ -94,7 +96,9 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
         "film": {
             "type": "hdrfilm", "width": job["size"][0], "height": job["size"][1],
             "rfilter": {"type": "box"}, "pixel_format": "rgb", "component_format": "float32",
+            **dict(zip(_CROP, job.get("crop", ()), strict=False)),
         },
+        "sampler": {"type": job.get("sampler", "independent")},
     }  # fmt: skip
     environment = {
         "type": "envmap",

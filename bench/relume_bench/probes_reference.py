@@ -85,8 +85,8 @@ def _make_mitsuba_bsdf(kind: str) -> dict[str, Any]:
     return bsdf(_make_terms(kind))
 
 
-def _while_it_moves(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.float32]:
-    """The image of a moving camera, with all light."""
+def render_moving_camera(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.float32]:
+    """Render the image of a moving camera, with all light."""
     picture = FreeCameraPicture(bake, view, is_watched=True)
     picture.set_look(look)
     picture.advance(None)
@@ -117,7 +117,7 @@ def _figure(kind: str, tiny: bool) -> Figure:
         look = validate(document, bake.default_look)
         rendered = render_image(bake, recipe.views[0], look)
         assert isinstance(bake, BakedFreeCamera)
-        plain = _while_it_moves(bake, recipe.views[0], look)
+        plain = render_moving_camera(bake, recipe.views[0], look)
         fixed_camera_image = _render_fixed_camera(scene, replace(recipe, method="gather"), Path(folder), look)
         integrator = {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": 6}
         job = {

@@ -20,15 +20,17 @@ from relume_bench.machine import measure_stolen_fraction, processor_ticks
 
 @dataclass(frozen=True)
 class Group:
-    """Figures that are measured together, by `measure(tiny)` of a module.
+    """Figures that are measured together, by `measure(tiny, *arguments)` of a module.
 
     Attributes:
         is_quick: `make test` checks them: accuracy without files or programs of others, in seconds.
+        arguments: choose the figures of a module with several groups.
     """
 
     module: str
     names: tuple[str, ...]
     is_quick: bool = False
+    arguments: tuple[str | float, ...] = ()
 
     def measure(self, tiny: bool) -> list[Figure]:
         """Measure; a failure becomes a figure without a value.
@@ -38,7 +40,7 @@ class Group:
         """
         start_time, ticks = time.perf_counter(), processor_ticks()
         try:
-            figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
+            figures: list[Figure] = importlib.import_module(self.module).measure(tiny, *self.arguments)
         except Exception as error:  # the other groups must still run
             traceback.print_exc()
             return [Figure(name, None, "", {"failed": f"{type(error).__name__}: {error}"[:500]}) for name in self.names]
@@ -212,6 +214,17 @@ GROUPS = (
     Group("relume_bench.glass", ("glass.rmse",)),
     Group("relume_bench.roughness_maps", ("roughness.rmse",)),
     Group("relume_bench.real_files", ("assets.rmse",)),
+    *(
+        Group("relume_bench.sharp", (f"sharp.rmse_{r}", f"sharp.speckle_{r}"), arguments=("metal", r))
+        for r in (0.02, 0.05, 0.1, 0.2, 0.3)
+    ),
+    *(Group("relume_bench.sharp", (f"sharp.rmse_plastic_{r}",), arguments=("plastic", r)) for r in (0.05, 0.1)),
+    Group("relume_bench.sharp_room", ("sharp.rmse_room",)),
+    Group(
+        "relume_bench.sharp_free_camera",
+        tuple(f"sharp.{kind}_rmse_{r}" for r in (0.02, 0.05, 0.1, 0.2, 0.3) for kind in ("static", "moving")),
+    ),
+    Group("relume_bench.sharp_edits", ("sharp.clean_s", "sharp.drag_fps")),
     Group("relume_bench.mirror", ("mirror.rmse", "mirror.sharp_rmse")),
     Group(
         "relume_bench.estimators",

@@ -80,3 +80,8 @@ def compare_with_passes(rendered: F64, passes: F32) -> NoiseCorrectedError:
         float(np.sqrt(spread / mean_squared_radiance)),
         float(np.sqrt(max(0.0, relative_squared_error) + 2 * deviation)),
     )
+
+
+def compare_pixels(rendered: F64, passes: F32, mask: NDArray[np.bool_]) -> NoiseCorrectedError:
+    """As `compare_with_passes`, over some pixels. mask: (height, width)"""
+    return compare_with_passes(rendered[mask][None], passes[:, mask][:, None])
