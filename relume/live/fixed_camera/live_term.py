@@ -39,6 +39,7 @@ class LiveTerm:
         target_rows_key: the same as bytes, in order of the curves' names, for keys.
         view_factor: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
         ready: its newest image.
+        levels: roughness levels of its samples.
         displayed: its image in the picture; differs from `ready` until all terms have an image in one light.
         is_composed: the picture's radiance contains `displayed` in its current state.
         mirror: the document whose mirror the picture shows, see `update_mirror`.
@@ -50,7 +51,7 @@ class LiveTerm:
         self.light = light
         self._is_solo = False
         self._before_solo: DisplayedImage | None = None  # reference image for the end of the solo
-        self._cos_theta_o, self._levels = cos_theta_o, levels
+        self._cos_theta_o, self.levels = cos_theta_o, levels
         tiles, samples = tile_layout(len(cos_theta_o))
         self.ready = self.displayed = DisplayedImage(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
@@ -76,7 +77,7 @@ class LiveTerm:
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """Set a new target; another model, or another value of a fixed parameter, starts from an empty image."""
-        target = TargetTerm.from_document(document, lambda: self._theta_o, self._levels)
+        target = TargetTerm.from_document(document, lambda: self._theta_o, self.levels)
         if target.model != self.model:
             self.ready, self._before_solo = DisplayedImage(np.zeros_like(self.ready.image)), None
             if not self.displayed.is_empty:  # the target has none of its curves

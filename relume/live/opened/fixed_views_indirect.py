@@ -26,6 +26,7 @@ from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.store.bake_protocol import StoreReader
+from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import RayList
 from relume.views.view import View
 
@@ -109,18 +110,25 @@ class BakedIndirectViews(BakedFixedViews):
         gather_rays = view.subset_rays(material, sample_indices)
         return replace(samples, stored_rays=gather_rays, mirror_visibility=mirror_visibility)
 
-    def _indirect_rays(
+    def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
+        """Return the exact outgoing light of patches."""
+        return self.indirect.outgoing_light(light, is_canceled) if light.paths.has_indirect else no_light()
+
+    def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
     ) -> tuple[RayList, ...]:
-        """Return the rays from patches, and those from virtual lights in planar mirrors."""
+        """Return the rays from patches."""
         gather_rays = samples.gather_rays(is_canceled)
         if gather_rays is None:
             return ()
         # in a preview, tracing overridden normals takes too long
         reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
-        rays = replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled))
+        return (replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled)),)
+
+    def _mirror_rays(self, samples: Samples, light: Illumination) -> tuple[RayList, ...]:
+        """Return the rays from virtual lights in planar mirrors."""
         mirror_light = self.mirror_light
-        if mirror_light is None or not mirror_light.is_in(light):
-            return (rays,)
-        assert samples.mirror_visibility is not None  # stored with the gather rays
-        return rays, mirror_light.virtual_lights(light).rays(samples.mirror_visibility)
+        if mirror_light is None or not light.paths.has_indirect or not mirror_light.is_in(light):
+            return ()
+        visible = samples.mirror_visibility
+        return () if visible is None else (mirror_light.virtual_lights(light).rays(visible),)

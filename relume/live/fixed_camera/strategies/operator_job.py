@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -29,6 +31,7 @@ class OperatorPrecompute:
 
     Attributes:
         basis: the free coefficients. key: of the operator in the cache. bands: of the term's curves, (3, J) each.
+        document, levels: of the term, and the roughness levels of its samples.
         light: the illumination. form: compression of the operator.
     """
 
@@ -37,6 +40,8 @@ class OperatorPrecompute:
     key: tuple[Hashable, ...]
     term: Term
     bands: Mapping[str, F64]
+    document: Mapping[str, Any]
+    levels: RoughnessLevels
     light: Illumination
     form: Compression
 
@@ -49,7 +54,8 @@ class OperatorPrecompute:
         """
         images, material, live = target
         key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.has_merged_lights)
-        return cls(target, basis, key, live.term, live.target_bands, live.light, form)
+        term_args = live.term, live.target_bands, live.document, live.levels
+        return cls(target, basis, key, *term_args, live.light, form)
 
     def job(self) -> Job:
         """Return the job; it can wait if the term already has a preview."""
@@ -69,7 +75,8 @@ class OperatorPrecompute:
         quality = LightQuality.MERGED if has_merged_lights else LightQuality.EXACT
 
         def build_operator() -> LinearOperator:
-            lights, receivers = images.incident_light(material, self.light, is_canceled, quality)
+            lobe = self.basis.lobe(self.document, self.levels)
+            lights, receivers = images.incident_light(material, self.light, is_canceled, quality, lobe)
 
             def precompute_at(samples: ShadingPoints) -> LinearOperator:
                 return precompute(self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits)

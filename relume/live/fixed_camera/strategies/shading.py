@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
+from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage, weighted_sum
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -40,6 +42,7 @@ class Shading:
 
     Attributes:
         key: of the image in the cache. model: of the term. bands: of its curves, (3, J) each.
+        document, levels: of the term, and the roughness levels of its samples.
         light_components: their sum is the light.
         is_default: the look is the scene's own, whose images are cached next to the store.
     """
@@ -49,6 +52,8 @@ class Shading:
     term: Term
     model: Hashable
     bands: Mapping[str, F64]
+    document: Mapping[str, Any]
+    levels: RoughnessLevels
     light: Illumination
     light_components: Sequence[LightComponent]
     is_default: bool
@@ -63,7 +68,8 @@ class Shading:
             for component, gain in split_for_shading(light).items()
         ]
         is_default = images.is_default(material, live, light)
-        return cls(target, key, live.term, live.model, live.target_bands, light, components, is_default)
+        term_args = live.term, live.model, live.target_bands, live.document, live.levels
+        return cls(target, key, *term_args, light, components, is_default)
 
     def job(self, priority: Priority | None = None) -> Job:
         """Return the job of the complete image. priority: None: it can wait if the term already has a preview."""
@@ -75,6 +81,11 @@ class Shading:
     def label(self) -> str:
         """Text for the user."""
         return f"{self.target.name}, {self.term.label}"
+
+    @cached_property
+    def lobe(self) -> LobeSampling | None:
+        """The lobe along which rays are traced; None if it is wide."""
+        return sample_lobe(self.document, self.levels)
 
     @property
     def num_bytes(self) -> int:
@@ -134,7 +145,7 @@ class Shading:
         partial_image.shade(
             self.term,
             self.bands,
-            *images.incident_light(material, light, is_canceled),
+            *images.incident_light(material, light, is_canceled, lobe=self.lobe),
             progress,
             is_canceled,
             sample_mask,

@@ -1,0 +1,246 @@
+"""Light along rays that were drawn from the lobe of a term: from patches, and from the texels of the environment.
+
+The light of the environment has two estimators: lobe rays, and its triangles with one visibility bit each. A bright
+triangle that few rays of a lobe meet would be noise in the first; a triangle that is wide beside the lobe would show
+its outline in the second. So each triangle m is shared out at each point,
+
+    t = 1 / (1 + (n / 8)²),   n = N p(ω) Ω_m,
+
+the share t to the triangle and the rest to the rays that meet it. n is the number of rays that are expected in it, p
+their density at the direction of the triangle that is nearest to the lobe's peak. Both estimators use the same t, so
+the sum is the light whatever t is (multiple importance sampling, Veach 1995).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.core.numba_options import NO_REFCOUNT
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.fast_math import acos_clamped, azimuth_fraction
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
+from relume.transport.gather_kernel import in_frame
+from relume.transport.light_culling import ListedLights, half_angle_reach
+from relume.transport.lobe_hits import LobeHits
+from relume.transport.outgoing_patch_light import OutgoingLight, bin_of
+from relume.transport.shading_points import ListedRays, ShadingPoints
+
+F32 = NDArray[np.float32]
+
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_PER_PI = np.float32(1 / math.pi)
+_PER_ENOUGH_RAYS = np.float32(1 / 8)
+_LEAST_SHARE = np.float32(1e-4)
+
+
+class LobeEnvironment(NamedTuple):
+    """The environment as lobe rays see it.
+
+    Attributes:
+        radiance: equirectangular map, top row first, times its gain; empty for no light.
+        tile: triangle of each texel.
+        rotation: cosine and sine of the map's rotation about +Y.
+        direction, radius, solid_angle: of the triangles.
+    """
+
+    radiance: Shaped[F32, "height width 3"]
+    tile: Shaped[NDArray[np.int32], "height width"]
+    rotation: Shaped[F32, " 2"]
+    direction: Shaped[F32, "M 3"]
+    radius: Shaped[F32, " M"]
+    solid_angle: Shaped[F32, " M"]
+
+
+NO_ENVIRONMENT = LobeEnvironment(
+    np.empty((0, 0, 3), np.float32), np.empty((0, 0), np.int32), np.array([1, 0], np.float32),
+    np.empty((0, 3), np.float32), *np.empty((2, 0), np.float32)
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LobeRays:
+    """Rays of the lobe of a term; a `relume.transport.shading_points.RayList`.
+
+    Attributes:
+        hits: what each ray meets. pattern: ray directions, shifted by the points' seeds.
+        outgoing: outgoing radiance of the patches. environment: light of the rays that leave the scene.
+    """
+
+    hits: LobeHits
+    pattern: LobePattern
+    outgoing: OutgoingLight
+    environment: LobeEnvironment
+
+    @property
+    def max_rays_per_point(self) -> int:
+        """Maximum number of rays of a point."""
+        return self.pattern.num_rays
+
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobeRays:
+        """Select the rays of some points; see `RayList`."""
+        return replace(self, hits=LobeHits(self.hits.patch[rows], self.hits.escapes[rows]))
+
+    def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
+        """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
+        r, level = receivers, _levels(receivers)
+        light_args = self.hits.patch, self.hits.escapes, self.pattern, self.outgoing, self.environment
+        return int(_list_lobe_rays(r.points, r.wo, level, *light_args, start, stop, listed))
+
+    def share_triangles(
+        self, lights: TriangleLights, receivers: ShadingPoints, start: int, num: int, listed: ListedLights, shading: F32
+    ) -> None:
+        """Multiply listed triangles by their share t, in place.
+
+        Args:
+            lights: the triangles. receivers: all points. start, num: the points of the list.
+            listed: entries. shading: of each entry. (1 or 3, K)
+        """
+        light_args = lights.radius, self.environment.solid_angle
+        _share_triangles(self.pattern, _levels(receivers), *light_args, start, num, listed, shading)
+
+
+def _levels(receivers: ShadingPoints) -> NDArray[np.uint8]:
+    """Return the roughness levels of points, or one for all."""
+    return np.zeros(1, np.uint8) if receivers.level is None else receivers.level
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _triangle_share(pattern, level, radius, solid_angle, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Share t of a triangle at a point. ix, iy, iz: local direction of the triangle. ox, oy, oz: local wo"""
+    if pattern.is_half_angle:
+        reach, cos_theta_d = half_angle_reach(radius, ix, iy, iz, ox, oy, oz)
+        angle = acos_clamped(_HALF * (iz + oz) / max(cos_theta_d, np.float32(1e-6))) - reach
+    else:
+        cos_theta_d = _ONE
+        angle = acos_clamped(iz * oz - ix * ox - iy * oy) - radius
+    band = min(int(pattern.scale * max(angle, _ZERO)), pattern.band_density.shape[1] - 1)
+    ratio = _PER_ENOUGH_RAYS * solid_angle * lobe_density(pattern, level, band, cos_theta_d)
+    share = _ONE / (_ONE + ratio * ratio)
+    return share if share > _LEAST_SHARE else _ZERO
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _share_triangles(pattern, level, radius, solid_angle, start, num, listed, shading):  # type: ignore[no-untyped-def]
+    """Multiply listed triangles by their share; see `LobeRays.share_triangles`."""
+    wi, wo = listed.wi, listed.wo
+    for row in range(num):
+        point_level = level[min(start + row, level.shape[0] - 1)]
+        for entry in range(listed.first[row], listed.first[row + 1]):
+            light = listed.light[entry]
+            share = _triangle_share(
+                pattern, point_level, radius[light], solid_angle[light],
+                wi[0, entry], wi[1, entry], wi[2, entry], wo[0, entry], wo[1, entry], wo[2, entry],
+            )  # fmt: skip
+            for channel in range(shading.shape[0]):
+                shading[channel, entry] *= share
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _texel(environment, dx, dy, dz, jitter):  # type: ignore[no-untyped-def]
+    """Return row and column of the texel in a world direction.
+
+    With a uniform jitter in [0, 1)², the mean over rays is the bilinear interpolation between the centers of texels.
+    """
+    cosine, sine = environment.rotation[0], environment.rotation[1]
+    x, z = dx * cosine - dz * sine, dx * sine + dz * cosine
+    height, width = environment.tile.shape
+    u = azimuth_fraction(x, z) + _HALF
+    polar = acos_clamped(abs(dy)) * _PER_PI
+    v = polar if dy >= 0 else _ONE - polar
+    row, column = v * np.float32(height) + jitter[1] - _HALF, u * np.float32(width) + jitter[0] - _HALF
+    return min(max(math.floor(row), 0), height - 1), (math.floor(column) + width) % width
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _from_environment(environment, pattern, level, frame, world, jitter, o):  # type: ignore[no-untyped-def]
+    """Radiance of the environment along a ray, less the share of the triangle that it meets.
+
+    Args:
+        frame: tangent, bitangent and normal of the point. world: world-space direction of the ray.
+        jitter: see `_texel`. o: local wo.
+    """
+    t, b, n = frame
+    row, column = _texel(environment, world[0], world[1], world[2], jitter)
+    tile = environment.tile[row, column]
+    d = environment.direction[tile]
+    share = _triangle_share(
+        pattern, level, environment.radius[tile], environment.solid_angle[tile],
+        t[0] * d[0] + t[1] * d[1] + t[2] * d[2],
+        b[0] * d[0] + b[1] * d[1] + b[2] * d[2],
+        n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
+        o[0], o[1], o[2],
+    )  # fmt: skip
+    radiance, rest = environment.radiance, _ONE - share
+    return rest * radiance[row, column, 0], rest * radiance[row, column, 1], rest * radiance[row, column, 2]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
+    """Radiance of a patch against a world-space direction."""
+    red, green, blue = outgoing.isotropic[patch, 0], outgoing.isotropic[patch, 1], outgoing.isotropic[patch, 2]
+    row = outgoing.lobe[patch] if outgoing.smooth.shape[0] > 0 else -1
+    if row >= 0:
+        bin_index = bin_of(outgoing.frame, row, -world[0], -world[1], -world[2])
+        red += outgoing.scale[row, 0] * outgoing.smooth[row, bin_index, 0]
+        green += outgoing.scale[row, 1] * outgoing.smooth[row, bin_index, 1]
+        blue += outgoing.scale[row, 2] * outgoing.smooth[row, bin_index, 2]
+    return red, green, blue
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _list_lobe_rays(points, wo, level, patch, escapes, pattern, outgoing, environment, start, stop, listed):  # type: ignore[no-untyped-def]
+    """List the lobe rays of points [start, stop) that carry light.
+
+    Args:
+        points: `SurfacePoints`. wo: view directions. (n, 3) level: roughness levels, or one.
+        patch, escapes: of `LobeHits`. pattern, outgoing, environment: of `LobeRays`. listed: `ListedRays`, written.
+    Returns:
+        K, the number of rays.
+    """
+    wi, end = listed.wi, 0
+    has_environment = environment.radiance.shape[0] > 0
+    for p in range(start, stop):
+        listed.first[p - start] = end
+        n, t = points.normal[p], points.tangent[p]
+        b, o = in_frame(n, t, wo[p])
+        point_level = level[min(p, level.shape[0] - 1)]
+        shift = lobe_shift(pattern, points.seed[p])
+        for ray in range(patch.shape[1]):
+            hit, is_escaping = patch[p, ray], (escapes[p, ray >> 3] >> (ray & 7)) & 1
+            if (hit == NO_PATCH and not is_escaping) or (is_escaping and not has_environment):
+                continue
+            (x, y, z), band = lobe_ray(pattern, point_level, ray, shift, o[0], o[1], o[2])
+            if z <= 0 or band < 0:
+                continue
+            world = (
+                t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z,
+            )  # fmt: skip
+            if is_escaping:
+                light = _from_environment(
+                    environment, pattern, point_level, (t, b, n), world, ray_jitter(ray, points.seed[p]), o
+                )
+            else:
+                light = _from_patch(outgoing, hit, world)
+            hx, hy, hz = x + o[0], y + o[1], z + o[2]
+            cos_theta_d = _HALF * np.float32(math.sqrt(hx * hx + hy * hy + hz * hz))
+            weight = z / max(lobe_density(pattern, point_level, band, cos_theta_d), np.float32(1e-20))
+            wi[0, end], wi[1, end], wi[2, end] = x, y, z
+            listed.wo[0, end], listed.wo[1, end], listed.wo[2, end] = o[0], o[1], o[2]
+            for channel in range(3):
+                listed.irradiance[channel, end] = weight * light[channel]
+            end += 1
+    listed.first[stop - start] = end
+    return end
+
+
+def find_lobe_rays(receivers: ShadingPoints) -> LobeRays | None:
+    """Return the lobe rays of points; None if they have none."""
+    return next((rays for rays in receivers.rays if isinstance(rays, LobeRays)), None)
