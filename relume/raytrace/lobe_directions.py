@@ -90,20 +90,39 @@ def lobe_ray(pattern, level, ray, shift, ox, oy, oz):  # type: ignore[no-untyped
     """
     u, v = pattern.uv[ray, 0] + shift[0], pattern.uv[ray, 1] + shift[1]
     u = u - _ONE if u >= _ONE else (u + _ONE if u < _ZERO else u)
-    num_cells = pattern.quantile.shape[1] - 1
-    position = u * np.float32(num_cells)
-    cell = min(int(position), num_cells - 1)
-    low, high = pattern.quantile[level, cell], pattern.quantile[level, cell + 1]
-    scaled = pattern.scale * (low + (position - np.float32(cell)) * (high - low))
+    scaled = pattern.scale * angle_at_quantile(pattern.quantile, level, u)
     band = min(int(scaled), pattern.band_density.shape[1] - 1)
     within = min(max(scaled - np.float32(band), _ZERO if band == 0 else _MARGIN), _ONE - _MARGIN)
-    angle, azimuth = (np.float32(band) + within) / pattern.scale, _TWO * _PI * v
+    wi, is_valid = lobe_direction(pattern.is_half_angle, (np.float32(band) + within) / pattern.scale, v, ox, oy, oz)
+    return wi, band if is_valid else -1
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def angle_at_quantile(quantile, row, u):  # type: ignore[no-untyped-def]
+    """Angle at the fraction u of a cumulative distribution, `LobeSampling.quantile` [row], radians."""
+    num_cells = quantile.shape[1] - 1
+    position = u * np.float32(num_cells)
+    cell = min(int(position), num_cells - 1)
+    low, high = quantile[row, cell], quantile[row, cell + 1]
+    return low + (position - np.float32(cell)) * (high - low)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_direction(is_half_angle, angle, v, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Local wi at an angle of a lobe.
+
+    Args:
+        is_half_angle: whether the angle is θh, else θr. angle: radians. v: azimuth as a fraction of a turn.
+        ox, oy, oz: local wo.
+    Returns:
+        wi, a tuple; False if it belongs to no half vector that the viewer sees.
+    """
+    azimuth = _TWO * _PI * v
     sine, z = np.float32(math.sin(angle)), np.float32(math.cos(angle))
     x, y = sine * np.float32(math.cos(azimuth)), sine * np.float32(math.sin(azimuth))
-    if pattern.is_half_angle:
+    if is_half_angle:
         twice_cosine = _TWO * (ox * x + oy * y + oz * z)
-        wi = twice_cosine * x - ox, twice_cosine * y - oy, twice_cosine * z - oz
-        return wi, band if twice_cosine > _ZERO else -1
+        return (twice_cosine * x - ox, twice_cosine * y - oy, twice_cosine * z - oz), twice_cosine > _ZERO
     # about the mirror direction (−ox, −oy, oz): the frame that rotates n to it along the shortest arc
     inverse = _ONE / max(_ONE + oz, _MIN_COSINE)
     along = x * ox + y * oy
@@ -111,7 +130,7 @@ def lobe_ray(pattern, level, ray, shift, ox, oy, oz):  # type: ignore[no-untyped
         x - ox * along * inverse - ox * z,
         y - oy * along * inverse - oy * z,
         along + oz * z,
-    ), band
+    ), True
 
 
 @nb.njit(nogil=True, cache=True, inline="always")

@@ -1,7 +1,12 @@
-"""Lobe rays, hits: what each ray of a sample's lobe meets, the environment or a patch."""
+"""Lobe rays, hits: what each ray of a sample's lobe meets, the environment or a patch.
+
+A ray that meets a surface with a narrow lobe of its own goes on along one direction of that lobe, up to four times:
+what is seen in chrome is not the light of a patch. The lobe's energy is its directional albedo, its shape is sampled.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,12 +20,22 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_cancellable
 from relume.patches.gather_hits import find_sides
 from relume.patches.patch_kdtree import NO_PATCH, PatchTree, locate
-from relume.raytrace.lobe_directions import LobePattern, lobe_ray, lobe_shift, ray_jitter
+from relume.raytrace.lobe_directions import (
+    LobePattern,
+    angle_at_quantile,
+    lobe_direction,
+    lobe_ray,
+    lobe_shift,
+    ray_jitter,
+)
 from relume.raytrace.ray_packet import (
     LANES,
     enable_lane,
     enable_stochastic_alpha,
+    get_direction,
     get_hit,
+    get_position,
+    get_uv,
     new_packet,
     set_direction,
     set_origin,
@@ -34,7 +49,102 @@ F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 256
 _ONE, _TWO = np.float32(1), np.float32(2)
+_MAX_REFLECTIONS = 4
 _HALF_WIDTH = 1.25  # of a square, by the spread of uniform points in it
+
+
+class LobePaths(NamedTuple):
+    """Lobe rays that went on from surfaces with narrow lobes, point by point in the order of their rays.
+
+    Attributes:
+        first: begin of each point's paths. ray: index of each path's ray.
+        patch: patch at its end, `NO_PATCH` for none. has_escaped: 1 if it left the scene.
+        throughput: product of the albedos of its surfaces. direction: of its last ray, world space.
+        blur: angle over which the environment is averaged, radians.
+    """
+
+    first: Shaped[NDArray[np.int64], " ends"]
+    ray: Shaped[NDArray[np.uint16], " K"]
+    patch: Shaped[NDArray[np.uint16], " K"]
+    has_escaped: Shaped[NDArray[np.uint8], " K"]
+    throughput: Shaped[F32, "K 3"]
+    direction: Shaped[F32, "K 3"]
+    blur: Shaped[F32, " K"]
+
+    @classmethod
+    def allocate(cls, num_points: int, num_paths: int) -> LobePaths:
+        """Allocate memory for paths."""
+        patch, ray, has_escaped = *np.empty((2, num_paths), np.uint16), np.empty(num_paths, np.uint8)
+        throughput, direction = np.empty((2, num_paths, 3), np.float32)
+        blur = np.empty(num_paths, np.float32)
+        return cls(np.zeros(num_points + 1, np.int64), ray, patch, has_escaped, throughput, direction, blur)
+
+    def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
+        """Select the paths of some points."""
+        count = np.diff(self.first)[rows]
+        first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+        index = np.arange(first[-1]) + np.repeat(self.first[:-1][rows] - first[:-1], count)
+        return LobePaths(first, *(array[index] for array in self[1:]))
+
+
+def no_paths(num_points: int) -> LobePaths:
+    """Return the paths of rays that meet no narrow lobe."""
+    return LobePaths.allocate(num_points, 0)
+
+
+class _Lanes(NamedTuple):
+    """State of the rays of all lanes.
+
+    Attributes:
+        seeds: of the points. keys: position and normal of each hit, moved by `_jitter`. roots: of its side.
+        patches: of the newest hits. last: patch of each path's end. throughput, blur, has_escaped: as in `LobePaths`.
+        is_path: whether the ray has met a narrow lobe.
+    """
+
+    seeds: Shaped[NDArray[np.uint32], " lanes"]
+    keys: Shaped[F32, "6 lanes"]
+    roots: Shaped[NDArray[np.int32], " lanes"]
+    patches: Shaped[NDArray[np.int32], " lanes"]
+    last: Shaped[NDArray[np.int32], " lanes"]
+    throughput: Shaped[F32, "3 lanes"]
+    blur: Shaped[F32, " lanes"]
+    has_escaped: Shaped[NDArray[np.bool_], " lanes"]
+    is_path: Shaped[NDArray[np.bool_], " lanes"]
+
+
+@nb.njit(nogil=True, cache=True)
+def _allocate_lanes():  # type: ignore[no-untyped-def]
+    return _Lanes(
+        np.zeros(LANES, np.uint32), np.zeros((6, LANES), np.float32), np.zeros(LANES, np.int32),
+        np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros((3, LANES), np.float32),
+        np.zeros(LANES, np.float32), np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_),
+    )  # fmt: skip
+
+
+class LobeSurfaces(NamedTuple):
+    """Surfaces from which lobe rays go on.
+
+    Attributes:
+        faces: corners of the triangles. face_material: their materials.
+        normals: of the corners; empty if only those of the triangles are known.
+        lobe: row of each material in the following arrays, −1 if rays end there.
+        quantile, is_half_angle: as in `LobeSampling`, at one level.
+        albedo: directional albedo at equal steps of cos θo from 0 to 1.
+        blur: see `LobePaths`.
+        tint: mean of the specular texture of each patch; ones in row `NO_PATCH`.
+        offset: of ray origins from surfaces, meters.
+    """
+
+    faces: Shaped[NDArray[np.uint32], "faces 3"]
+    face_material: Shaped[NDArray[np.int32], " faces"]
+    normals: Shaped[F32, "corners 3"]
+    lobe: Shaped[NDArray[np.int32], " materials"]
+    quantile: Shaped[F32, "S quantiles"]
+    is_half_angle: Shaped[NDArray[np.bool_], " S"]
+    albedo: Shaped[F32, "S steps 3"]
+    blur: Shaped[F32, " S"]
+    tint: Shaped[F32, "patches 3"]
+    offset: float
 
 
 @dataclass(frozen=True)
@@ -44,15 +154,21 @@ class LobeHits:
     Attributes:
         patch: index of the patch that each ray hits, `NO_PATCH` for none.
         escapes: ray k of a point in bit k & 7 of byte k >> 3, set if it leaves the scene.
+        paths: the rays that go on from narrow lobes.
     """
 
     patch: Shaped[NDArray[np.uint16], "n rays"]
     escapes: Shaped[NDArray[np.uint8], "n bytes"]
+    paths: LobePaths
 
     @property
     def num_bytes(self) -> int:
         """Memory in use."""
-        return self.patch.nbytes + self.escapes.nbytes
+        return self.patch.nbytes + self.escapes.nbytes + sum(array.nbytes for array in self.paths)
+
+    def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobeHits:
+        """Select points."""
+        return LobeHits(self.patch[rows], self.escapes[rows], self.paths.rows(rows))
 
 
 class PatchLookup(NamedTuple):
@@ -113,6 +229,15 @@ def _aim(pattern, ray, levels, shifts, frames, local_wo, width, packet):  # type
     return num_valid
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, inline="always")
+def tangents_of(n):  # type: ignore[no-untyped-def]
+    """Two tangents of a unit normal, a tuple (Duff 2017, "Building an orthonormal basis, revisited")."""
+    sign = _ONE if n[2] >= 0 else -_ONE
+    a = -_ONE / (sign + n[2])
+    b = n[0] * n[1] * a
+    return (_ONE + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (b, sign + n[1] * n[1] * a, -n[1])
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _jitter(ray, seeds, reach, patches, keys):  # type: ignore[no-untyped-def]
     """Move hits on their tangent planes, within about a patch: the mean over rays is interpolated between patches.
@@ -126,51 +251,164 @@ def _jitter(ray, seeds, reach, patches, keys):  # type: ignore[no-untyped-def]
         u, v = ray_jitter(ray, seeds[k])
         u, v = width * (_TWO * u - _ONE), width * (_TWO * v - _ONE)
         nx, ny, nz = keys[3, k], keys[4, k], keys[5, k]
-        sign = _ONE if nz >= 0 else -_ONE  # orthonormal basis of Duff 2017
-        a = -_ONE / (sign + nz)
-        b = nx * ny * a
-        keys[0, k] += u * (_ONE + sign * nx * nx * a) + v * b
-        keys[1, k] += u * sign * b + v * (sign + ny * ny * a)
-        keys[2, k] += -u * sign * nx - v * ny
+        t, b = tangents_of((nx, ny, nz))
+        for axis in range(3):
+            keys[axis, k] += u * t[axis] + v * b[axis]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _normal_at_hit(packet, k, face, face_normal, surfaces):  # type: ignore[no-untyped-def]
+    """Interpolated normal at a lane's hit, and the triangle's, both toward the ray's origin. Two tuples"""
+    fx, fy, fz = face_normal[face, 0], face_normal[face, 1], face_normal[face, 2]
+    dx, dy, dz = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)
+    side = -_ONE if fx * dx + fy * dy + fz * dz > 0 else _ONE
+    fx, fy, fz = side * fx, side * fy, side * fz
+    if surfaces.normals.shape[0] == 0:
+        return (fx, fy, fz), (fx, fy, fz)
+    u, v = get_uv(packet, k)
+    a, b, c = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
+    w = _ONE - u - v
+    nx = side * (w * surfaces.normals[a, 0] + u * surfaces.normals[b, 0] + v * surfaces.normals[c, 0])
+    ny = side * (w * surfaces.normals[a, 1] + u * surfaces.normals[b, 1] + v * surfaces.normals[c, 1])
+    nz = side * (w * surfaces.normals[a, 2] + u * surfaces.normals[b, 2] + v * surfaces.normals[c, 2])
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length < np.float32(1e-6) or nx * dx + ny * dy + nz * dz > 0:
+        return (fx, fy, fz), (fx, fy, fz)
+    return (nx / length, ny / length, nz / length), (fx, fy, fz)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _reflect(packet, k, lobe, random, face_normal, surfaces, throughput):  # type: ignore[no-untyped-def]
+    """Aim a lane along the lobe of the surface that it hits; return False if the light is absorbed.
+
+    Args:
+        packet: its ray is replaced. k: the lane. lobe: row in `LobeSurfaces`. random: two numbers in [0, 1).
+        face_normal: of all faces. surfaces: `LobeSurfaces`. throughput: multiplied by the albedo. (3, `LANES`)
+    """
+    face, _ = get_hit(packet, k)
+    n, f = _normal_at_hit(packet, k, face, face_normal, surfaces)
+    t, b = tangents_of(n)
+    dx, dy, dz = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)
+    ox, oy = -(t[0] * dx + t[1] * dy + t[2] * dz), -(b[0] * dx + b[1] * dy + b[2] * dz)
+    oz = min(max(-(n[0] * dx + n[1] * dy + n[2] * dz), np.float32(1e-4)), _ONE)
+    step = oz * np.float32(surfaces.albedo.shape[1] - 1)
+    cell = min(int(step), surfaces.albedo.shape[1] - 2)
+    for channel in range(3):
+        low, high = surfaces.albedo[lobe, cell, channel], surfaces.albedo[lobe, cell + 1, channel]
+        throughput[channel, k] *= low + (step - np.float32(cell)) * (high - low)
+    angle = angle_at_quantile(surfaces.quantile, lobe, random[0])
+    (x, y, z), is_valid = lobe_direction(surfaces.is_half_angle[lobe], angle, random[1], ox, oy, oz)
+    wx, wy, wz = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
+    offset, facing = np.float32(surfaces.offset), f[0] * wx + f[1] * wy + f[2] * wz
+    px, py, pz = get_position(packet, k, 0), get_position(packet, k, 1), get_position(packet, k, 2)
+    set_origin(packet, k, px + offset * f[0], py + offset * f[1], pz + offset * f[2])
+    set_direction(packet, k, wx, wy, wz, np.float32(np.inf))
+    return is_valid and z > 0 and facing > 0
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _locate_smoothly(packet, ray, lookup, lanes):  # type: ignore[no-untyped-def]
+    """Find the patches that the rays of all lanes hit, moved by `_jitter`."""
+    tree, roots, patches = lookup.tree, lanes.roots, lanes.patches
+    find_sides(packet, (lookup.normals, lookup.sides), tree.roots, lanes.keys, roots)
+    for k in range(LANES):
+        patches[k] = roots[k]
+    locate(tree, lanes.keys, patches)
+    _jitter(ray, lanes.seeds, lookup.reach, patches, lanes.keys)
+    for k in range(LANES):
+        patches[k] = roots[k]
+    locate(tree, lanes.keys, patches)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end):  # type: ignore[no-untyped-def]
+    """Follow the rays of all lanes that hit a narrow lobe, and store their ends.
+
+    Args:
+        packet: traced rays. ray: their index. num_rays: rays of a point. first, width: points of the lanes.
+        lookup, surfaces: `PatchLookup`, `LobeSurfaces`. lanes: `_Lanes`, with the patches of the traced rays.
+        paths: `LobePaths`, written, with the point of each path in `first`. end: number of paths so far.
+    Returns:
+        New number of paths.
+    """
+    seeds, _, _, patches, last, throughput, blur, has_escaped, is_path = lanes
+    for k in range(LANES):
+        is_path[k], has_escaped[k], last[k] = False, False, patches[k]
+        throughput[0, k] = throughput[1, k] = throughput[2, k] = _ONE
+    for depth in range(1, _MAX_REFLECTIONS + 1):
+        num_active = 0
+        for k in range(LANES):
+            face = get_hit(packet, k)[0] if packet.is_active[k] != 0 else np.int32(-1)
+            lobe = surfaces.lobe[surfaces.face_material[face]] if face >= 0 else np.int32(-1)
+            is_reflected = False
+            if lobe >= 0:
+                for channel in range(3):
+                    throughput[channel, k] *= surfaces.tint[last[k], channel]
+                random = ray_jitter(ray + depth * num_rays, seeds[k])
+                is_path[k], blur[k], last[k] = True, surfaces.blur[lobe], NO_PATCH
+                is_reflected = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput)
+            enable_lane(packet, k, is_reflected)
+            num_active += is_reflected
+        if num_active == 0:
+            break
+        trace_hits(packet)
+        _locate_smoothly(packet, ray, lookup, lanes)
+        for k in range(LANES):
+            if packet.is_active[k] != 0:
+                last[k], has_escaped[k] = patches[k], get_hit(packet, k)[0] < 0
+    for k in range(width):
+        if is_path[k]:
+            paths.first[end], paths.ray[end], paths.patch[end] = first + k, ray, last[k]
+            paths.has_escaped[end], paths.blur[end] = has_escaped[k], blur[k]
+            for axis in range(3):
+                paths.throughput[end, axis] = throughput[axis, k]
+                paths.direction[end, axis] = get_direction(packet, k, axis)
+            end += 1
+    return end
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(tracer, points, wo, level, lookup, pattern, start, stop, patch, escapes):  # type: ignore[no-untyped-def]
+def _trace(tracer, points, wo, level, lookup, surfaces, pattern, start, stop, patch, escapes, paths):  # type: ignore[no-untyped-def]
     """Trace all rays of points [start, stop), the same ray of `LANES` points at once.
 
     Args:
         tracer: of closest hits. points: `SurfacePoints`. wo: view directions. level: roughness levels, or one.
-        lookup: `PatchLookup`. pattern: `LobePattern`. patch, escapes: of `LobeHits`, written; escapes are zero before.
+        lookup, surfaces: `PatchLookup`, `LobeSurfaces`. pattern: `LobePattern`.
+        patch, escapes: of `LobeHits`, written; escapes are zero before. paths: see `_follow`.
+    Returns:
+        Number of paths.
     """
-    packet, surfaces, tree = new_packet(tracer), (lookup.normals, lookup.sides), lookup.tree
+    packet, lanes, end = new_packet(tracer), _allocate_lanes(), 0
     frames, local_wo = np.empty((3, 3, LANES), np.float32), np.empty((3, LANES), np.float32)
-    shifts, keys = np.empty((2, LANES), np.float32), np.zeros((6, LANES), np.float32)
-    levels, seeds = np.empty(LANES, np.int64), np.empty(LANES, np.uint32)
-    roots, patches = np.empty(LANES, np.int32), np.empty(LANES, np.int32)
+    shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
+    follows, num_rays = surfaces.quantile.shape[0] > 0, patch.shape[1]
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
-        _load_points(points, wo, first, width, packet, frames, local_wo)
         for k in range(LANES):
             p = first + min(k, width - 1)
-            levels[k], seeds[k] = level[min(p, level.shape[0] - 1)], points.seed[p]
-            shifts[0, k], shifts[1, k] = lobe_shift(pattern, seeds[k])
-        for ray in range(patch.shape[1]):
+            levels[k], lanes.seeds[k] = level[min(p, level.shape[0] - 1)], points.seed[p]
+            shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
+        _load_points(points, wo, first, width, packet, frames, local_wo)
+        for ray in range(num_rays):
             if _aim(pattern, ray, levels, shifts, frames, local_wo, width, packet) == 0:
                 continue
             trace_hits(packet)
-            find_sides(packet, surfaces, tree.roots, keys, roots)
-            patches[:] = roots
-            locate(tree, keys, patches)
-            _jitter(ray, seeds, lookup.reach, patches, keys)
-            locate(tree, keys, roots)
+            _locate_smoothly(packet, ray, lookup, lanes)
             for k in range(width):
-                patch[first + k, ray] = roots[k]
+                patch[first + k, ray] = lanes.patches[k]
                 escapes[first + k, ray >> 3] |= (get_hit(packet, k)[0] < 0) << (ray & 7)
+            if follows:
+                before = end
+                end = _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
+                if end > before:
+                    _load_points(points, wo, first, width, packet, frames, local_wo)
+    return end
 
 
 def trace_lobe_rays(
     geometry: SceneBuffers,
     lookup: PatchLookup,
+    surfaces: LobeSurfaces,
     points: SurfacePoints,
     wo: Shaped[F32, "n 3"],
     level: Shaped[NDArray[np.uint8], " n"] | None,
@@ -180,21 +418,30 @@ def trace_lobe_rays(
     """Trace the lobe rays of points. O(n · rays · (log triangles + log patches)) time.
 
     Args:
-        geometry: the scene's triangles. lookup: finds patches.
+        geometry: the scene's triangles. lookup: finds patches. surfaces: from which rays go on.
         points: ray origins; their seeds shift the pattern. wo: view directions, unit, world space.
         level: roughness levels; None if all points have the same. pattern: rays of every point.
         is_canceled: polled.
     Raises:
         CancelledError: `is_canceled` returned true.
     """
-    num_points = points.num_points
-    patch = np.full((num_points, pattern.num_rays), NO_PATCH, np.uint16)
-    escapes = np.zeros((num_points, -(-pattern.num_rays // 8)), np.uint8)
+    num_points, num_rays = points.num_points, pattern.num_rays
+    patch = np.full((num_points, num_rays), NO_PATCH, np.uint16)
+    escapes = np.zeros((num_points, -(-num_rays // 8)), np.uint8)
     levels = np.zeros(1, np.uint8) if level is None else level
-    args = geometry.embree.hit_tracer(coherent=False), points, wo, levels, lookup, pattern
+    args = geometry.embree.hit_tracer(coherent=False), points, wo, levels, lookup, surfaces, pattern
+    found: dict[int, LobePaths] = {}
 
     def kernel(start: int, stop: int) -> None:
-        _trace(*args, start, stop, patch, escapes)
+        capacity = (stop - start) * num_rays if len(surfaces.quantile) else 0
+        paths = LobePaths.allocate(capacity - 1, capacity)
+        num_paths = _trace(*args, start, stop, patch, escapes, paths)
+        order = np.argsort(paths.first[:num_paths], kind="stable")
+        found[start] = LobePaths(*(array[:num_paths][order] for array in paths))
 
     parallel_for_cancellable(kernel, num_points, _POINTS_PER_RANGE, lambda _: None, is_canceled, "tracing lobes")
-    return LobeHits(patch, escapes)
+    if not found:
+        return LobeHits(patch, escapes, no_paths(num_points))
+    point, *columns = (np.concatenate(arrays) for arrays in zip(*(found[k] for k in sorted(found)), strict=True))
+    first = np.searchsorted(point, np.arange(num_points + 1)).astype(np.int64)
+    return LobeHits(patch, escapes, LobePaths(first, *columns))

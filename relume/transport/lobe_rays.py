@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.fast_math import acos_clamped, azimuth_fraction
+from relume.patches.neighbor_filter import NeighborFilter
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
 from relume.transport.gather_kernel import in_frame
@@ -35,7 +36,7 @@ from relume.transport.shading_points import ListedRays, ShadingPoints
 
 F32 = NDArray[np.float32]
 
-_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _PER_PI = np.float32(1 / math.pi)
 _PER_ENOUGH_RAYS = np.float32(1 / 8)
 _LEAST_SHARE = np.float32(1e-4)
@@ -49,6 +50,8 @@ class LobeEnvironment(NamedTuple):
         tile: triangle of each texel.
         rotation: cosine and sine of the map's rotation about +Y.
         direction, radius, solid_angle: of the triangles.
+        texels, levels: the map at halved sizes down to one row; begin, height and width of each in `texels`.
+        is_direct: rays that leave the scene at once bring its light; others always do.
     """
 
     radiance: Shaped[F32, "height width 3"]
@@ -57,11 +60,15 @@ class LobeEnvironment(NamedTuple):
     direction: Shaped[F32, "M 3"]
     radius: Shaped[F32, " M"]
     solid_angle: Shaped[F32, " M"]
+    texels: Shaped[F32, "texels 3"]
+    levels: Shaped[NDArray[np.int64], "levels 3"]
+    is_direct: bool
 
 
 NO_ENVIRONMENT = LobeEnvironment(
     np.empty((0, 0, 3), np.float32), np.empty((0, 0), np.int32), np.array([1, 0], np.float32),
-    np.empty((0, 3), np.float32), *np.empty((2, 0), np.float32)
+    np.empty((0, 3), np.float32), *np.empty((2, 0), np.float32), np.empty((0, 3), np.float32),
+    np.empty((0, 3), np.int64), False,
 )  # fmt: skip
 
 
@@ -72,12 +79,16 @@ class LobeRays:
     Attributes:
         hits: what each ray meets. pattern: ray directions, shifted by the points' seeds.
         outgoing: outgoing radiance of the patches. environment: light of the rays that leave the scene.
+        broad_share: share of each patch's isotropic radiance that its narrow lobe does not reflect.
+        sharing: filter over neighboring points; None: each point uses its own rays.
     """
 
     hits: LobeHits
     pattern: LobePattern
     outgoing: OutgoingLight
     environment: LobeEnvironment
+    broad_share: Shaped[F32, " patches"]
+    sharing: NeighborFilter | None = None
 
     @property
     def max_rays_per_point(self) -> int:
@@ -86,13 +97,14 @@ class LobeRays:
 
     def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobeRays:
         """Select the rays of some points; see `RayList`."""
-        return replace(self, hits=LobeHits(self.hits.patch[rows], self.hits.escapes[rows]))
+        return replace(self, hits=self.hits.rows(rows), sharing=None)
 
     def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
         r, level = receivers, _levels(receivers)
-        light_args = self.hits.patch, self.hits.escapes, self.pattern, self.outgoing, self.environment
-        return int(_list_lobe_rays(r.points, r.wo, level, *light_args, start, stop, listed))
+        light_args = self.outgoing, self.broad_share, self.environment
+        hits = self.hits.patch, self.hits.escapes, self.hits.paths
+        return int(_list_lobe_rays(r.points, r.wo, level, hits, self.pattern, light_args, start, stop, listed))
 
     def share_triangles(
         self, lights: TriangleLights, receivers: ShadingPoints, start: int, num: int, listed: ListedLights, shading: F32
@@ -144,14 +156,13 @@ def _share_triangles(pattern, level, radius, solid_angle, start, num, listed, sh
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _texel(environment, dx, dy, dz, jitter):  # type: ignore[no-untyped-def]
+def _texel(rotation, height, width, world, jitter):  # type: ignore[no-untyped-def]
     """Return row and column of the texel in a world direction.
 
     With a uniform jitter in [0, 1)², the mean over rays is the bilinear interpolation between the centers of texels.
     """
-    cosine, sine = environment.rotation[0], environment.rotation[1]
+    cosine, sine, (dx, dy, dz) = rotation[0], rotation[1], world
     x, z = dx * cosine - dz * sine, dx * sine + dz * cosine
-    height, width = environment.tile.shape
     u = azimuth_fraction(x, z) + _HALF
     polar = acos_clamped(abs(dy)) * _PER_PI
     v = polar if dy >= 0 else _ONE - polar
@@ -168,7 +179,8 @@ def _from_environment(environment, pattern, level, frame, world, jitter, o):  # 
         jitter: see `_texel`. o: local wo.
     """
     t, b, n = frame
-    row, column = _texel(environment, world[0], world[1], world[2], jitter)
+    height, width = environment.tile.shape
+    row, column = _texel(environment.rotation, height, width, world, jitter)
     tile = environment.tile[row, column]
     d = environment.direction[tile]
     share = _triangle_share(
@@ -195,27 +207,57 @@ def _from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
     return red, green, blue
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _blurred_environment(environment, blur, world):  # type: ignore[no-untyped-def]
+    """Radiance of the environment averaged over about an angle, radians. world: world-space direction"""
+    height = environment.radiance.shape[0]
+    texels = blur * _TWO * np.float32(height) * _PER_PI
+    level = min(int(math.log2(max(texels, _ONE))), environment.levels.shape[0] - 1)
+    begin, rows, columns = environment.levels[level, 0], environment.levels[level, 1], environment.levels[level, 2]
+    row, column = _texel(environment.rotation, rows, columns, world, (_HALF, _HALF))
+    index = begin + row * columns + column
+    return environment.texels[index, 0], environment.texels[index, 1], environment.texels[index, 2]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _along_path(paths, index, outgoing, environment, has_environment):  # type: ignore[no-untyped-def]
+    """Radiance that a path brings from its end, times its throughput."""
+    d = paths.direction[index]
+    red = green = blue = _ZERO
+    if paths.has_escaped[index] == 0:
+        if paths.patch[index] != NO_PATCH:
+            red, green, blue = _from_patch(outgoing, paths.patch[index], (d[0], d[1], d[2]))
+    elif has_environment:
+        red, green, blue = _blurred_environment(environment, paths.blur[index], (d[0], d[1], d[2]))
+    throughput = paths.throughput[index]
+    return throughput[0] * red, throughput[1] * green, throughput[2] * blue
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _list_lobe_rays(points, wo, level, patch, escapes, pattern, outgoing, environment, start, stop, listed):  # type: ignore[no-untyped-def]
+def _list_lobe_rays(points, wo, level, hits, pattern, light_args, start, stop, listed):  # type: ignore[no-untyped-def]
     """List the lobe rays of points [start, stop) that carry light.
 
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) level: roughness levels, or one.
-        patch, escapes: of `LobeHits`. pattern, outgoing, environment: of `LobeRays`. listed: `ListedRays`, written.
+        hits: the fields of `LobeHits`. pattern: of `LobeRays`. light_args: its outgoing, broad_share and environment.
+        listed: `ListedRays`, written.
     Returns:
         K, the number of rays.
     """
-    wi, end = listed.wi, 0
-    has_environment = environment.radiance.shape[0] > 0
+    (patch, escapes, paths), (outgoing, broad_share, environment) = hits, light_args
+    wi, end, has_environment = listed.wi, 0, environment.radiance.shape[0] > 0
+    is_direct = has_environment and environment.is_direct
     for p in range(start, stop):
         listed.first[p - start] = end
         n, t = points.normal[p], points.tangent[p]
         b, o = in_frame(n, t, wo[p])
         point_level = level[min(p, level.shape[0] - 1)]
-        shift = lobe_shift(pattern, points.seed[p])
+        shift, path, last_path = lobe_shift(pattern, points.seed[p]), paths.first[p], paths.first[p + 1]
         for ray in range(patch.shape[1]):
+            is_path = path < last_path and paths.ray[path] == ray
+            path += is_path
             hit, is_escaping = patch[p, ray], (escapes[p, ray >> 3] >> (ray & 7)) & 1
-            if (hit == NO_PATCH and not is_escaping) or (is_escaping and not has_environment):
+            if (hit == NO_PATCH and not is_escaping and not is_path) or (is_escaping and not is_direct):
                 continue
             (x, y, z), band = lobe_ray(pattern, point_level, ray, shift, o[0], o[1], o[2])
             if z <= 0 or band < 0:
@@ -224,8 +266,15 @@ def _list_lobe_rays(points, wo, level, patch, escapes, pattern, outgoing, enviro
                 t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z,
             )  # fmt: skip
             if is_escaping:
-                light = _from_environment(
-                    environment, pattern, point_level, (t, b, n), world, ray_jitter(ray, points.seed[p]), o
+                jitter = ray_jitter(ray, points.seed[p])
+                light = _from_environment(environment, pattern, point_level, (t, b, n), world, jitter, o)
+            elif is_path:
+                red, green, blue = _along_path(paths, path - 1, outgoing, environment, has_environment)
+                share = broad_share[hit]
+                light = (
+                    red + share * outgoing.isotropic[hit, 0],
+                    green + share * outgoing.isotropic[hit, 1],
+                    blue + share * outgoing.isotropic[hit, 2],
                 )
             else:
                 light = _from_patch(outgoing, hit, world)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.transport.diffuse_projector import diffuse_quotients
+from relume.transport.lobe_rays import LobeRays
 from relume.transport.ray_kernel import allocate_scratch, project_rays, sum_rays, weight_rays
 from relume.transport.shading_points import GatherRays, RayList, ShadingPoints, allocate_list, is_area_light
 from relume.transport.term_contraction import Contraction
@@ -39,13 +40,15 @@ class RayProjector:
         for rays in self._receivers.rays:
             if is_area_light(rays, self._contraction.kinds.size):
                 continue  # listed as triangles
-            if isinstance(rays, GatherRays) and rays.sharing is not None:
+            if isinstance(rays, GatherRays | LobeRays) and rays.sharing is not None:
                 self._add_shared(rays, rays.sharing, start, stop, radiance)
             else:
                 self._add(rays, self._receivers, start, stop, radiance)
         out += self._contraction.constant[:, None] * radiance
 
-    def _add_shared(self, rays: GatherRays, sharing: NeighborFilter, start: int, stop: int, out: F32) -> None:
+    def _add_shared(
+        self, rays: GatherRays | LobeRays, sharing: NeighborFilter, start: int, stop: int, out: F32
+    ) -> None:
         """Add the light of points' own rays and of their neighbors' rays."""
         filter_passes, rows = sharing.weights_for(self._term).find_dependencies(start, stop)
         radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)

@@ -19,7 +19,7 @@ from relume.lights.spherical_triangles import EnvironmentTexels, integrate_envir
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
-from relume.transport.lobe_hits import LobeHits
+from relume.transport.lobe_hits import LobeHits, no_paths
 from relume.transport.lobe_rays import NO_ENVIRONMENT, LobeRays
 from relume.transport.outgoing_patch_light import isotropic, no_light
 from relume.transport.shading.shader import Shader
@@ -28,6 +28,7 @@ from relume.transport.term_contraction import contract
 
 NUM_POINTS = 64
 NO_HIT = 65_535
+NO_SHARE = np.ones(65_536, np.float32)
 
 
 def document(model, **params):
@@ -48,10 +49,13 @@ def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotat
     lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance), rotation).ungrouped()
     pattern = make_lobe_pattern(sample_lobe(term_document, NO_LEVELS), num_rays, 3)
     hits = LobeHits(
-        np.full((len(normal), num_rays), NO_HIT, np.uint16), np.full((len(normal), -(-num_rays // 8)), 255, np.uint8)
+        np.full((len(normal), num_rays), NO_HIT, np.uint16),
+        np.full((len(normal), -(-num_rays // 8)), 255, np.uint8),
+        no_paths(len(normal)),
     )
     tile = tile_of_texels(tiles, radiance.shape[:2], rotation)
-    rays = LobeRays(hits, pattern, no_light(), lobe_environment(radiance, tile, rotation, lights))
+    environment = lobe_environment(radiance, tile, rotation, lights, is_direct=True)
+    rays = LobeRays(hits, pattern, no_light(), environment, NO_SHARE)
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), visible)
     return lights, ref.only_above(replace(points, rays=(rays,)), lights)
@@ -142,9 +146,9 @@ def test_rays_that_hit_a_patch_bring_its_light():
     patch[:, ::2] = NO_HIT  # a surface without a patch is black
     light = np.zeros((65_536, 3), np.float32)
     light[7] = 1, 2, 3
-    hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8))
+    hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), no_paths(NUM_POINTS))
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
-    rays = LobeRays(hits, pattern, isotropic(light), NO_ENVIRONMENT)
+    rays = LobeRays(hits, pattern, isotropic(light), NO_ENVIRONMENT, NO_SHARE)
     listed = build_ray_lists(rays, points, 0, NUM_POINTS)
     num = int(listed.first[-1])
     assert 0.99 * 27 * NUM_POINTS < num <= 27 * NUM_POINTS  # few leave below the horizon

@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.live.fixed_camera.illumination import Illumination, LightSource
     from relume.look import EnvironmentKey, LightGeometry
     from relume.operators.image_cache import ImageFiles
+    from relume.patches.neighbor_filter import NeighborFilter
     from relume.raytrace.moving_light import MovingLight
     from relume.raytrace.surface_points import SurfacePoints
     from relume.scene.model import Camera
@@ -72,6 +73,11 @@ class Samples(Protocol):
 
     @property
     def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"] | None: ...
+    @property
+    def neighbor_filter(self) -> NeighborFilter | None:
+        """The filter over neighboring samples; None if they are not neighbors."""
+        ...
+
     @property
     def num_bytes(self) -> int:
         """Memory that they take."""

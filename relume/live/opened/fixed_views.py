@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
+from relume.brdf.albedo import Reflectances
 from relume.brdf.lobe_sampling import LobeSampling
 from relume.core.cache import Cache
 from relume.core.digest import digest
@@ -27,12 +28,14 @@ from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights,
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.indirect_solver import IndirectSolver
-from relume.live.opened.lobe_light import LobeTracer, lobe_environment, tile_of_texels
+from relume.live.opened.lobe_light import LobeTracer, lobe_environment, reflects_narrowly, tile_of_texels
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
+from relume.patches.neighbor_filter import NeighborFilter
+from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.lobe_hits import LobeHits
@@ -44,6 +47,7 @@ from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
+_SHARED_MEDIAN = np.radians(1.5)  # of a lobe that is wider than the normals of shared neighbors differ
 
 F32 = NDArray[np.float32]
 FindLights = Callable[[EnvironmentKey, LightQuality], TriangleLights]
@@ -243,10 +247,19 @@ class BakedFixedViews:
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
         pattern = self._lobe_tracer.pattern(lobe)
-        key = digest((pattern.num_rays, pattern.quantile.tobytes()))
-        hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(receivers, pattern, is_canceled))
-        environment = self._lobe_environment(light) if light.has_direct_environment else NO_ENVIRONMENT
-        return LobeRays(hits, pattern, self._patch_light(light, is_canceled), environment)
+        reflectances = light.reflectances if light.paths.has_all_bounces else ()
+        narrow = tuple(reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances)
+        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
+        tint, share = self._lobe_patches(reflectances)
+        trace_args = receivers, pattern, reflectances if any(narrow) else (), tint, is_canceled
+        hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(*trace_args))
+        environment = self._lobe_environment(light) if light.has_environment else NO_ENVIRONMENT
+        sharing = samples.neighbor_filter if lobe.median > _SHARED_MEDIAN else None
+        return LobeRays(hits, pattern, self._patch_light(light, is_canceled), environment, share, sharing)
+
+    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
+        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
+        return np.ones((NO_PATCH + 1, 3), np.float32), np.ones(NO_PATCH + 1, np.float32)
 
     def _lobe_environment(self, light: Illumination) -> LobeEnvironment:
         key, rotation = light.environment, light.environment.rotation
@@ -255,7 +268,8 @@ class BakedFixedViews:
             (self.key, "tile of texels", key), lambda: tile_of_texels(self.tiles, radiance.shape[:2], rotation)
         )
         gain = np.array(light.environment_gain, np.float32)
-        return lobe_environment(radiance if np.all(gain == 1) else radiance * gain, tile, rotation, lights)
+        weighted = radiance if np.all(gain == 1) else radiance * gain
+        return lobe_environment(weighted, tile, rotation, lights, is_direct=light.paths.direct)
 
     def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
         """Return the outgoing light of patches: there are none."""
@@ -349,6 +363,11 @@ class MaterialSamples:
         """The virtual lights that the samples see in planar mirrors."""
         return self.view.mirror_lights(self.material)
 
+    @property
+    def neighbor_filter(self) -> NeighborFilter:
+        """The filter over neighboring samples."""
+        return self.view.neighbor_filter(self.material)
+
     def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
         """Return the hits of lobe rays, cached until the memory is needed."""
         return self.cache.transient.get_value((*self.key, "lobe hits", key), trace)
@@ -379,6 +398,7 @@ class SelectedSamples:
     local: LocalLights
     stored_rays: GatherRays | None = None
     mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
+    neighbor_filter = None
 
     @property
     def num_bytes(self) -> int:

@@ -11,12 +11,15 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.albedo import Reflectances
+from relume.brdf.texture_slots import TEXTURES
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
 from relume.live.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples, read_fields
 from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.lobe_light import broad_share
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.live.opened.planar_mirror_light import MirrorLightTransfer
@@ -29,6 +32,8 @@ from relume.store.bake_protocol import StoreReader
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import RayList
 from relume.views.view import View
+
+F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -113,6 +118,15 @@ class BakedIndirectViews(BakedFixedViews):
     def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
         """Return the exact outgoing light of patches."""
         return self.indirect.outgoing_light(light, is_canceled) if light.paths.has_indirect else no_light()
+
+    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
+        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
+        tint, share = super()._lobe_patches(reflectances)
+        if reflectances:
+            material, num = self.patches.material, self.patches.num_patches
+            tint[:num] = self.patches.texture_multipliers(reflectances)[TEXTURES.index("specular")]
+            share[:num] = np.array([broad_share(reflectance) for reflectance in reflectances], np.float32)[material]
+        return tint, share
 
     def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]

@@ -43,7 +43,6 @@ class Shading:
     Attributes:
         key: of the image in the cache. model: of the term. bands: of its curves, (3, J) each.
         document, levels: of the term, and the roughness levels of its samples.
-        light_components: their sum is the light.
         is_default: the look is the scene's own, whose images are cached next to the store.
     """
 
@@ -55,7 +54,6 @@ class Shading:
     document: Mapping[str, Any]
     levels: RoughnessLevels
     light: Illumination
-    light_components: Sequence[LightComponent]
     is_default: bool
 
     @classmethod
@@ -63,13 +61,9 @@ class Shading:
         """Return the shading of a target in some light."""
         images, material, live = target
         key = images.image_key(material, live, light)
-        components = [
-            LightComponent(images.image_key(material, live, component), component, gain)
-            for component, gain in split_for_shading(light).items()
-        ]
         is_default = images.is_default(material, live, light)
         term_args = live.term, live.model, live.target_bands, live.document, live.levels
-        return cls(target, key, *term_args, light, components, is_default)
+        return cls(target, key, *term_args, light, is_default)
 
     def job(self, priority: Priority | None = None) -> Job:
         """Return the job of the complete image. priority: None: it can wait if the term already has a preview."""
@@ -86,6 +80,17 @@ class Shading:
     def lobe(self) -> LobeSampling | None:
         """The lobe along which rays are traced; None if it is wide."""
         return sample_lobe(self.document, self.levels)
+
+    @cached_property
+    def light_components(self) -> Sequence[LightComponent]:
+        """Components whose sum is the light. Lobe rays bring all light at once."""
+        if self.lobe is not None:
+            return []
+        images, material, live = self.target
+        return [
+            LightComponent(images.image_key(material, live, component), component, gain)
+            for component, gain in split_for_shading(self.light).items()
+        ]
 
     @property
     def num_bytes(self) -> int:
