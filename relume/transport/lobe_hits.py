@@ -48,7 +48,7 @@ from relume.transport.gather_kernel import in_frame
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 256
-_ONE, _TWO = np.float32(1), np.float32(2)
+_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1), np.float32(2)
 _MAX_REFLECTIONS = 4
 _HALF_WIDTH = 1.25  # of a square, by the spread of uniform points in it
 
@@ -296,7 +296,8 @@ def _reflect(packet, k, lobe, random, face_normal, surfaces, throughput):  # typ
     for channel in range(3):
         low, high = surfaces.albedo[lobe, cell, channel], surfaces.albedo[lobe, cell + 1, channel]
         throughput[channel, k] *= low + (step - np.float32(cell)) * (high - low)
-    angle = angle_at_quantile(surfaces.quantile, lobe, random[0])
+    # its tail is left to the blur of what is seen there: it would be noise
+    angle = angle_at_quantile(surfaces.quantile, lobe, _HALF * random[0])
     (x, y, z), is_valid = lobe_direction(surfaces.is_half_angle[lobe], angle, random[1], ox, oy, oz)
     wx, wy, wz = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
     offset, facing = np.float32(surfaces.offset), f[0] * wx + f[1] * wy + f[2] * wz

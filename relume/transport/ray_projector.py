@@ -52,10 +52,15 @@ class RayProjector:
         """Add the light of points' own rays and of their neighbors' rays."""
         filter_passes, rows = sharing.weights_for(self._term).find_dependencies(start, stop)
         radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)
-        self._add(rays.unshared(rows), self._receivers.without_light(rows), 0, len(rows), radiance)
+        receivers = self._receivers.without_light(rows)
+        self._add(rays.unshared(rows), receivers, 0, len(rows), radiance)
         filtered = radiance.reshape(len(rows), -1)
+        # before the curves of θo a narrow lobe grows as 1 / cos θo, and must not spread from grazing neighbors
+        cosine = _view_cosines(receivers) if isinstance(rays, LobeRays) else np.ones((len(rows), 1), np.float32)
+        filtered *= cosine
         for filter_pass in reversed(filter_passes):
             filtered = filter_pass @ filtered
+        filtered /= cosine[np.searchsorted(rows, np.arange(start, stop))]
         out += filtered.reshape(out.shape)
 
     def _add(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int, out: F32) -> None:
@@ -86,3 +91,8 @@ class RayProjector:
         """List rays of points; return the term's quotients. (1 or 3, rays)"""
         num = rays.list_into(self._listed, receivers, start, stop)
         return np.asarray(self._term.quotients(*self._listed.wi[:, :num], *self._listed.wo[:, :num]))
+
+
+def _view_cosines(receivers: ShadingPoints) -> Shaped[F32, "n 1"]:
+    """Return cos θo of points, at least a hundredth."""
+    return np.maximum(np.einsum("nc,nc->n", receivers.normal, receivers.wo), np.float32(0.01))[:, None]
