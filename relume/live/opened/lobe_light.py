@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,7 @@ from relume.transport.shading_points import ShadingPoints
 F32 = NDArray[np.float32]
 
 _ALBEDO_STEPS = 64
+_PEAK, _PEAK_ROWS, _COARSE_ROWS = 8, 4, 64  # brightness of peaks by the mean; rows of maps
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _NUM_RAYS = ((0.3, 34), (1.0, 55), (2.5, 144), (90.0, 233))
 """Rays of lobes whose median is up to so many degrees."""
@@ -146,6 +147,31 @@ def tile_of_texels(tiles: Tiles, shape: tuple[int, int], rotation: float) -> Sha
     return tiles.locate(directions).reshape(shape)
 
 
+def _halved(radiance: F32) -> list[F32]:
+    """Return a map and its halves down to one row."""
+    images = [radiance]
+    while min(images[-1].shape[:2]) > 1 and images[-1].shape[0] % 2 == images[-1].shape[1] % 2 == 0:
+        images.append(halve_to_width(images[-1], images[-1].shape[1] // 2))
+    return images
+
+
+def _without_peaks(images: Sequence[F32]) -> list[F32]:
+    """Spread the peaks of coarse images widely: hardly any ray of two wide lobes meets a sun, and each would be a spot.
+
+    Their light stays, though not its direction.
+    """
+    limit = _PEAK * images[0].mean(axis=(0, 1))
+    limited = _halved(np.minimum(images[0], limit))
+    spread = [image - low for image, low in zip(images, limited, strict=True)]
+    widest = next((k for k, image in enumerate(images) if len(image) <= _PEAK_ROWS), len(images) - 1)
+    out = list(images)
+    for k in range(widest):
+        if len(images[k]) <= _COARSE_ROWS:
+            factor = len(images[k]) // len(images[widest])
+            out[k] = limited[k] + np.repeat(np.repeat(spread[widest], factor, axis=0), factor, axis=1)
+    return out
+
+
 def lobe_environment(
     radiance: Shaped[F32, "height width 3"],
     tile: Shaped[NDArray[np.int32], "height width"],
@@ -161,9 +187,7 @@ def lobe_environment(
         is_direct: as in `LobeEnvironment`.
     """
     cosine_sine = np.array([np.cos(np.radians(rotation)), np.sin(np.radians(rotation))], np.float32)
-    images = [np.ascontiguousarray(radiance, np.float32)]
-    while min(images[-1].shape[:2]) > 1 and images[-1].shape[0] % 2 == images[-1].shape[1] % 2 == 0:
-        images.append(halve_to_width(images[-1], images[-1].shape[1] // 2))
+    images = _without_peaks(_halved(np.ascontiguousarray(radiance, np.float32)))
     shapes = np.array([image.shape[:2] for image in images])
     sizes = shapes.prod(axis=1)
     levels = np.column_stack([np.cumsum(sizes) - sizes, shapes])
