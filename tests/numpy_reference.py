@@ -256,7 +256,7 @@ def split_by_roughness_level(view: View, index, terms):
             continue
         assert term["model"] == "ggx"
         for k, ratio in enumerate(ratios):
-            roughness = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.03, 1).tolist()
+            roughness = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.01, 1).tolist()
             level_rows = slice(*np.searchsorted(level, [k, k + 1]))
             yield {**term, "params": {**term["params"], "roughness": roughness}}, level_rows
 

@@ -438,7 +438,7 @@ def trace_lobe_rays(
         paths = LobePaths.allocate(capacity - 1, capacity)
         num_paths = _trace(*args, start, stop, patch, escapes, paths)
         order = np.argsort(paths.first[:num_paths], kind="stable")
-        found[start] = LobePaths(*(array[:num_paths][order] for array in paths))
+        found[start] = LobePaths._make(array[:num_paths][order] for array in paths)
 
     parallel_for_cancellable(kernel, num_points, _POINTS_PER_RANGE, lambda _: None, is_canceled, "tracing lobes")
     if not found:

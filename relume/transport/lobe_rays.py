@@ -66,10 +66,16 @@ class LobeEnvironment(NamedTuple):
 
 
 NO_ENVIRONMENT = LobeEnvironment(
-    np.empty((0, 0, 3), np.float32), np.empty((0, 0), np.int32), np.array([1, 0], np.float32),
-    np.empty((0, 3), np.float32), *np.empty((2, 0), np.float32), np.empty((0, 3), np.float32),
-    np.empty((0, 3), np.int64), False,
-)  # fmt: skip
+    radiance=np.empty((0, 0, 3), np.float32),
+    tile=np.empty((0, 0), np.int32),
+    rotation=np.array([1, 0], np.float32),
+    direction=np.empty((0, 3), np.float32),
+    radius=np.empty(0, np.float32),
+    solid_angle=np.empty(0, np.float32),
+    texels=np.empty((0, 3), np.float32),
+    levels=np.empty((0, 3), np.int64),
+    is_direct=False,
+)
 
 
 @dataclass(frozen=True)

@@ -95,4 +95,5 @@ class RayProjector:
 
 def _view_cosines(receivers: ShadingPoints) -> Shaped[F32, "n 1"]:
     """Return cos θo of points, at least a hundredth."""
-    return np.maximum(np.einsum("nc,nc->n", receivers.normal, receivers.wo), np.float32(0.01))[:, None]
+    cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo)
+    return np.asarray(np.maximum(cosine, 0.01)[:, None], np.float32)
