@@ -50,6 +50,8 @@ F32 = NDArray[np.float32]
 _POINTS_PER_RANGE = 256
 _HALF, _ONE, _TWO = np.float32(0.5), np.float32(1), np.float32(2)
 _MAX_REFLECTIONS = 4
+_PIXEL_SEED = np.uint32(0x5BD1E995)
+_MIN_COSINE = np.float32(1e-3)
 _HALF_WIDTH = 1.25  # of a square, by the spread of uniform points in it
 
 
@@ -193,39 +195,64 @@ def patch_reach(position: Shaped[F32, "patches points 3"]) -> Shaped[F32, " reac
     return reach
 
 
-@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _load_points(points, wo, first, width, packet, frames, local_wo):  # type: ignore[no-untyped-def]
-    """Load points [first, first + width) into the lanes of a packet, with their local frames.
+NO_FOOTPRINT = np.zeros((1, 2, 2, 3), np.float32)
+"""Of points without an extent."""
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def lobe_ray_in_pixel(pattern, level, ray, shift, normal, tangent, wo, footprint, seed):  # type: ignore[no-untyped-def]
+    """World-space direction of a ray from somewhere within its point's part of a pixel.
 
     Args:
-        points: `SurfacePoints`. wo: view directions. (n, 3) packet: written.
-        frames: tangent, bitangent and normal, written. (3, 3, `LANES`) local_wo: written. (3, `LANES`)
+        pattern, level, ray, shift: as in `lobe_ray`. normal, tangent, wo: of the point. footprint: of the point.
+        seed: of the point.
+    Returns:
+        The direction, a tuple; True if the ray is above the horizon and must be traced.
     """
+    u, v = ray_jitter(ray, np.uint32(seed) ^ _PIXEL_SEED)
+    u, v = u - _HALF, v - _HALF
+    nx = normal[0] + u * footprint[0, 0, 0] + v * footprint[0, 1, 0]
+    ny = normal[1] + u * footprint[0, 0, 1] + v * footprint[0, 1, 1]
+    nz = normal[2] + u * footprint[0, 0, 2] + v * footprint[0, 1, 2]
+    scale = _ONE / math.sqrt(nx * nx + ny * ny + nz * nz)
+    nx, ny, nz = nx * scale, ny * scale, nz * scale
+    ox = wo[0] + u * footprint[1, 0, 0] + v * footprint[1, 1, 0]
+    oy = wo[1] + u * footprint[1, 0, 1] + v * footprint[1, 1, 1]
+    oz = wo[2] + u * footprint[1, 0, 2] + v * footprint[1, 1, 2]
+    scale = _ONE / math.sqrt(ox * ox + oy * oy + oz * oz)
+    ox, oy, oz = ox * scale, oy * scale, oz * scale
+    along = nx * tangent[0] + ny * tangent[1] + nz * tangent[2]
+    tx, ty, tz = tangent[0] - along * nx, tangent[1] - along * ny, tangent[2] - along * nz
+    scale = _ONE / math.sqrt(tx * tx + ty * ty + tz * tz)
+    t = tx * scale, ty * scale, tz * scale
+    b, local = in_frame((nx, ny, nz), t, (ox, oy, oz))
+    (x, y, z), band = lobe_ray(pattern, level, ray, shift, local[0], local[1], max(local[2], _MIN_COSINE))
+    d = t[0] * x + b[0] * y + nx * z, t[1] * x + b[1] * y + ny * z, t[2] * x + b[2] * y + nz * z
+    return d, z > 0 and band >= 0 and d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2] > 0
+
+
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def _load_points(points, first, width, packet):  # type: ignore[no-untyped-def]
+    """Load points [first, first + width) into the lanes of a packet."""
     for k in range(LANES):
         p = first + min(k, width - 1)
-        n, t = points.normal[p], points.tangent[p]
-        b, o = in_frame(n, t, wo[p])
         set_origin(packet, k, points.position[p, 0], points.position[p, 1], points.position[p, 2])
         enable_stochastic_alpha(packet, k, points.alpha_sample[min(p, points.alpha_sample.shape[0] - 1)])
-        for axis in range(3):
-            frames[0, axis, k], frames[1, axis, k], frames[2, axis, k] = t[axis], b[axis], n[axis]
-            local_wo[axis, k] = o[axis]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _aim(pattern, ray, levels, shifts, frames, local_wo, width, packet):  # type: ignore[no-untyped-def]
-    """Aim the same ray of all lanes; return the number of rays above their horizon."""
+def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, packet):  # type: ignore[no-untyped-def]
+    """Aim the same ray of all lanes; return the number of rays above their horizon. See `_trace`."""
     num_valid = 0
     for k in range(LANES):
-        shift = shifts[0, k], shifts[1, k]
-        (x, y, z), band = lobe_ray(pattern, levels[k], ray, shift, local_wo[0, k], local_wo[1, k], local_wo[2, k])
-        dx = frames[0, 0, k] * x + frames[1, 0, k] * y + frames[2, 0, k] * z
-        dy = frames[0, 1, k] * x + frames[1, 1, k] * y + frames[2, 1, k] * z
-        dz = frames[0, 2, k] * x + frames[1, 2, k] * y + frames[2, 2, k] * z
+        p = first + min(k, width - 1)
+        (dx, dy, dz), is_above = lobe_ray_in_pixel(
+            pattern, levels[k], ray, (shifts[0, k], shifts[1, k]), points.normal[p], points.tangent[p], wo[p],
+            footprint[min(p, footprint.shape[0] - 1)], points.seed[p],
+        )  # fmt: skip
         set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
-        is_above = z > 0 and band >= 0 and k < width
-        enable_lane(packet, k, is_above)
-        num_valid += is_above
+        enable_lane(packet, k, is_above and k < width)
+        num_valid += is_above and k < width
     return num_valid
 
 
@@ -369,18 +396,18 @@ def _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths,
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(tracer, points, wo, level, lookup, surfaces, pattern, start, stop, patch, escapes, paths):  # type: ignore[no-untyped-def]
+def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, start, stop, patch, escapes, paths):  # type: ignore[no-untyped-def]
     """Trace all rays of points [start, stop), the same ray of `LANES` points at once.
 
     Args:
-        tracer: of closest hits. points: `SurfacePoints`. wo: view directions. level: roughness levels, or one.
+        tracer: of closest hits. points: `SurfacePoints`. wo: view directions. footprint: as in `trace_lobe_rays`, or
+            one. level: roughness levels, or one.
         lookup, surfaces: `PatchLookup`, `LobeSurfaces`. pattern: `LobePattern`.
         patch, escapes: of `LobeHits`, written; escapes are zero before. paths: see `_follow`.
     Returns:
         Number of paths.
     """
     packet, lanes, end = new_packet(tracer), _allocate_lanes(), 0
-    frames, local_wo = np.empty((3, 3, LANES), np.float32), np.empty((3, LANES), np.float32)
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
     follows, num_rays = surfaces.quantile.shape[0] > 0, patch.shape[1]
     for first in range(start, stop, LANES):
@@ -389,9 +416,9 @@ def _trace(tracer, points, wo, level, lookup, surfaces, pattern, start, stop, pa
             p = first + min(k, width - 1)
             levels[k], lanes.seeds[k] = level[min(p, level.shape[0] - 1)], points.seed[p]
             shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
-        _load_points(points, wo, first, width, packet, frames, local_wo)
+        _load_points(points, first, width, packet)
         for ray in range(num_rays):
-            if _aim(pattern, ray, levels, shifts, frames, local_wo, width, packet) == 0:
+            if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, packet) == 0:
                 continue
             trace_hits(packet)
             _locate_smoothly(packet, ray, lookup, lanes)
@@ -402,7 +429,7 @@ def _trace(tracer, points, wo, level, lookup, surfaces, pattern, start, stop, pa
                 before = end
                 end = _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
                 if end > before:
-                    _load_points(points, wo, first, width, packet, frames, local_wo)
+                    _load_points(points, first, width, packet)
     return end
 
 
@@ -412,6 +439,7 @@ def trace_lobe_rays(
     surfaces: LobeSurfaces,
     points: SurfacePoints,
     wo: Shaped[F32, "n 3"],
+    footprint: Shaped[F32, "#n 2 2 3"],
     level: Shaped[NDArray[np.uint8], " n"] | None,
     pattern: LobePattern,
     is_canceled: Callable[[], bool] = lambda: False,
@@ -421,6 +449,8 @@ def trace_lobe_rays(
     Args:
         geometry: the scene's triangles. lookup: finds patches. surfaces: from which rays go on.
         points: ray origins; their seeds shift the pattern. wo: view directions, unit, world space.
+        footprint: change of each point's normal and of its wo along the two sides of its part of a pixel, over which
+            rays are spread; or `NO_FOOTPRINT`.
         level: roughness levels; None if all points have the same. pattern: rays of every point.
         is_canceled: polled.
     Raises:
@@ -430,7 +460,7 @@ def trace_lobe_rays(
     patch = np.full((num_points, num_rays), NO_PATCH, np.uint16)
     escapes = np.zeros((num_points, -(-num_rays // 8)), np.uint8)
     levels = np.zeros(1, np.uint8) if level is None else level
-    args = geometry.embree.hit_tracer(coherent=False), points, wo, levels, lookup, surfaces, pattern
+    args = geometry.embree.hit_tracer(coherent=False), points, wo, footprint, levels, lookup, surfaces, pattern
     found: dict[int, LobePaths] = {}
 
     def kernel(start: int, stop: int) -> None:

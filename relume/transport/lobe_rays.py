@@ -25,12 +25,11 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.fast_math import acos_clamped, azimuth_fraction
-from relume.patches.neighbor_filter import NeighborFilter
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
 from relume.transport.gather_kernel import in_frame
 from relume.transport.light_culling import ListedLights, half_angle_reach
-from relume.transport.lobe_hits import LobeHits
+from relume.transport.lobe_hits import LobeHits, lobe_ray_in_pixel
 from relume.transport.outgoing_patch_light import OutgoingLight, bin_of
 from relume.transport.shading_points import ListedRays, ShadingPoints
 
@@ -86,7 +85,7 @@ class LobeRays:
         hits: what each ray meets. pattern: ray directions, shifted by the points' seeds.
         outgoing: outgoing radiance of the patches. environment: light of the rays that leave the scene.
         broad_share: share of each patch's isotropic radiance that its narrow lobe does not reflect.
-        sharing: filter over neighboring points; None: each point uses its own rays.
+        footprint: of each point, see `trace_lobe_rays`.
     """
 
     hits: LobeHits
@@ -94,7 +93,7 @@ class LobeRays:
     outgoing: OutgoingLight
     environment: LobeEnvironment
     broad_share: Shaped[F32, " patches"]
-    sharing: NeighborFilter | None = None
+    footprint: Shaped[F32, "#n 2 2 3"]
 
     @property
     def max_rays_per_point(self) -> int:
@@ -103,14 +102,15 @@ class LobeRays:
 
     def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobeRays:
         """Select the rays of some points; see `RayList`."""
-        return replace(self, hits=self.hits.rows(rows), sharing=None)
+        footprint = self.footprint if len(self.footprint) == 1 else self.footprint[rows]
+        return replace(self, hits=self.hits.rows(rows), footprint=footprint)
 
     def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
-        r, level = receivers, _levels(receivers)
+        r, point_args = receivers, (self.footprint, _levels(receivers))
         light_args = self.outgoing, self.broad_share, self.environment
         hits = self.hits.patch, self.hits.escapes, self.hits.paths
-        return int(_list_lobe_rays(r.points, r.wo, level, hits, self.pattern, light_args, start, stop, listed))
+        return int(_list_lobe_rays(r.points, r.wo, *point_args, hits, self.pattern, light_args, start, stop, listed))
 
     def share_triangles(
         self, lights: TriangleLights, receivers: ShadingPoints, start: int, num: int, listed: ListedLights, shading: F32
@@ -122,7 +122,7 @@ class LobeRays:
             listed: entries. shading: of each entry. (1 or 3, K)
         """
         light_args = lights.radius, self.environment.solid_angle
-        _share_triangles(self.pattern, _levels(receivers), *light_args, start, num, listed, shading)
+        _share_triangles(self.pattern, self.footprint, _levels(receivers), *light_args, start, num, listed, shading)
 
 
 def _levels(receivers: ShadingPoints) -> NDArray[np.uint8]:
@@ -131,14 +131,30 @@ def _levels(receivers: ShadingPoints) -> NDArray[np.uint8]:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _triangle_share(pattern, level, radius, solid_angle, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Share t of a triangle at a point. ix, iy, iz: local direction of the triangle. ox, oy, oz: local wo"""
+def _spread(footprint, p):  # type: ignore[no-untyped-def]
+    """Angle by which half vectors change at most between the middle and a corner of a point's footprint, radians."""
+    sides, total = footprint[min(p, footprint.shape[0] - 1)], _ZERO
+    for axis in range(2):
+        n, o = sides[0, axis], sides[1, axis]
+        total += _HALF * np.float32(math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]))
+        total += np.float32(0.25) * np.float32(math.sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]))
+    return total
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _triangle_share(pattern, level, radius, solid_angle, spread, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Share t of a triangle at a point.
+
+    Args:
+        pattern, level: of the point. radius, solid_angle: of the triangle. spread: from `_spread`.
+        ix, iy, iz: local direction of the triangle. ox, oy, oz: local wo.
+    """
     if pattern.is_half_angle:
         reach, cos_theta_d = half_angle_reach(radius, ix, iy, iz, ox, oy, oz)
-        angle = acos_clamped(_HALF * (iz + oz) / max(cos_theta_d, np.float32(1e-6))) - reach
+        angle = acos_clamped(_HALF * (iz + oz) / max(cos_theta_d, np.float32(1e-6))) - reach - spread
     else:
         cos_theta_d = _ONE
-        angle = acos_clamped(iz * oz - ix * ox - iy * oy) - radius
+        angle = acos_clamped(iz * oz - ix * ox - iy * oy) - radius - _TWO * spread
     band = min(int(pattern.scale * max(angle, _ZERO)), pattern.band_density.shape[1] - 1)
     ratio = _PER_ENOUGH_RAYS * solid_angle * lobe_density(pattern, level, band, cos_theta_d)
     share = _ONE / (_ONE + ratio * ratio)
@@ -146,15 +162,15 @@ def _triangle_share(pattern, level, radius, solid_angle, ix, iy, iz, ox, oy, oz)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _share_triangles(pattern, level, radius, solid_angle, start, num, listed, shading):  # type: ignore[no-untyped-def]
+def _share_triangles(pattern, footprint, level, radius, solid_angle, start, num, listed, shading):  # type: ignore[no-untyped-def]
     """Multiply listed triangles by their share; see `LobeRays.share_triangles`."""
     wi, wo = listed.wi, listed.wo
     for row in range(num):
-        point_level = level[min(start + row, level.shape[0] - 1)]
+        point_level, spread = level[min(start + row, level.shape[0] - 1)], _spread(footprint, start + row)
         for entry in range(listed.first[row], listed.first[row + 1]):
             light = listed.light[entry]
             share = _triangle_share(
-                pattern, point_level, radius[light], solid_angle[light],
+                pattern, point_level, radius[light], solid_angle[light], spread,
                 wi[0, entry], wi[1, entry], wi[2, entry], wo[0, entry], wo[1, entry], wo[2, entry],
             )  # fmt: skip
             for channel in range(shading.shape[0]):
@@ -177,11 +193,12 @@ def _texel(rotation, height, width, world, jitter):  # type: ignore[no-untyped-d
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _from_environment(environment, pattern, level, frame, world, jitter, o):  # type: ignore[no-untyped-def]
+def _from_environment(environment, pattern, level, spread, frame, world, jitter, o):  # type: ignore[no-untyped-def]
     """Radiance of the environment along a ray, less the share of the triangle that it meets.
 
     Args:
-        frame: tangent, bitangent and normal of the point. world: world-space direction of the ray.
+        spread: from `_spread`. frame: tangent, bitangent and normal of the point.
+        world: world-space direction of the ray.
         jitter: see `_texel`. o: local wo.
     """
     t, b, n = frame
@@ -190,7 +207,7 @@ def _from_environment(environment, pattern, level, frame, world, jitter, o):  # 
     tile = environment.tile[row, column]
     d = environment.direction[tile]
     share = _triangle_share(
-        pattern, level, environment.radius[tile], environment.solid_angle[tile],
+        pattern, level, environment.radius[tile], environment.solid_angle[tile], spread,
         t[0] * d[0] + t[1] * d[1] + t[2] * d[2],
         b[0] * d[0] + b[1] * d[1] + b[2] * d[2],
         n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
@@ -240,11 +257,11 @@ def _along_path(paths, index, outgoing, environment, has_environment):  # type: 
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _list_lobe_rays(points, wo, level, hits, pattern, light_args, start, stop, listed):  # type: ignore[no-untyped-def]
+def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, start, stop, listed):  # type: ignore[no-untyped-def]
     """List the lobe rays of points [start, stop) that carry light.
 
     Args:
-        points: `SurfacePoints`. wo: view directions. (n, 3) level: roughness levels, or one.
+        points: `SurfacePoints`. wo: view directions. (n, 3) footprint: of `LobeRays`. level: roughness levels, or one.
         hits: the fields of `LobeHits`. pattern: of `LobeRays`. light_args: its outgoing, broad_share and environment.
         listed: `ListedRays`, written.
     Returns:
@@ -257,7 +274,7 @@ def _list_lobe_rays(points, wo, level, hits, pattern, light_args, start, stop, l
         listed.first[p - start] = end
         n, t = points.normal[p], points.tangent[p]
         b, o = in_frame(n, t, wo[p])
-        point_level = level[min(p, level.shape[0] - 1)]
+        point_level, spread = level[min(p, level.shape[0] - 1)], _spread(footprint, p)
         shift, path, last_path = lobe_shift(pattern, points.seed[p]), paths.first[p], paths.first[p + 1]
         for ray in range(patch.shape[1]):
             is_path = path < last_path and paths.ray[path] == ray
@@ -268,12 +285,12 @@ def _list_lobe_rays(points, wo, level, hits, pattern, light_args, start, stop, l
             (x, y, z), band = lobe_ray(pattern, point_level, ray, shift, o[0], o[1], o[2])
             if z <= 0 or band < 0:
                 continue
-            world = (
-                t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z,
-            )  # fmt: skip
+            world, _ = lobe_ray_in_pixel(
+                pattern, point_level, ray, shift, n, t, wo[p], footprint[min(p, footprint.shape[0] - 1)], points.seed[p]
+            )
             if is_escaping:
                 jitter = ray_jitter(ray, points.seed[p])
-                light = _from_environment(environment, pattern, point_level, (t, b, n), world, jitter, o)
+                light = _from_environment(environment, pattern, point_level, spread, (t, b, n), world, jitter, o)
             elif is_path:
                 red, green, blue = _along_path(paths, path - 1, outgoing, environment, has_environment)
                 share = broad_share[hit]

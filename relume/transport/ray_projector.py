@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from relume.brdf.term import Term
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.transport.diffuse_projector import diffuse_quotients
-from relume.transport.lobe_rays import LobeRays
 from relume.transport.ray_kernel import allocate_scratch, project_rays, sum_rays, weight_rays
 from relume.transport.shading_points import GatherRays, RayList, ShadingPoints, allocate_list, is_area_light
 from relume.transport.term_contraction import Contraction
@@ -40,27 +39,20 @@ class RayProjector:
         for rays in self._receivers.rays:
             if is_area_light(rays, self._contraction.kinds.size):
                 continue  # listed as triangles
-            if isinstance(rays, GatherRays | LobeRays) and rays.sharing is not None:
+            if isinstance(rays, GatherRays) and rays.sharing is not None:
                 self._add_shared(rays, rays.sharing, start, stop, radiance)
             else:
                 self._add(rays, self._receivers, start, stop, radiance)
         out += self._contraction.constant[:, None] * radiance
 
-    def _add_shared(
-        self, rays: GatherRays | LobeRays, sharing: NeighborFilter, start: int, stop: int, out: F32
-    ) -> None:
+    def _add_shared(self, rays: GatherRays, sharing: NeighborFilter, start: int, stop: int, out: F32) -> None:
         """Add the light of points' own rays and of their neighbors' rays."""
         filter_passes, rows = sharing.weights_for(self._term).find_dependencies(start, stop)
         radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)
-        receivers = self._receivers.without_light(rows)
-        self._add(rays.unshared(rows), receivers, 0, len(rows), radiance)
+        self._add(rays.unshared(rows), self._receivers.without_light(rows), 0, len(rows), radiance)
         filtered = radiance.reshape(len(rows), -1)
-        # before the curves of θo a narrow lobe grows as 1 / cos θo, and must not spread from grazing neighbors
-        cosine = _view_cosines(receivers) if isinstance(rays, LobeRays) else np.ones((len(rows), 1), np.float32)
-        filtered *= cosine
         for filter_pass in reversed(filter_passes):
             filtered = filter_pass @ filtered
-        filtered /= cosine[np.searchsorted(rows, np.arange(start, stop))]
         out += filtered.reshape(out.shape)
 
     def _add(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int, out: F32) -> None:
@@ -91,9 +83,3 @@ class RayProjector:
         """List rays of points; return the term's quotients. (1 or 3, rays)"""
         num = rays.list_into(self._listed, receivers, start, stop)
         return np.asarray(self._term.quotients(*self._listed.wi[:, :num], *self._listed.wo[:, :num]))
-
-
-def _view_cosines(receivers: ShadingPoints) -> Shaped[F32, "n 1"]:
-    """Return cos θo of points, at least a hundredth."""
-    cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo)
-    return np.asarray(np.maximum(cosine, 0.01)[:, None], np.float32)

@@ -220,7 +220,7 @@ class View:
         rows = self.rows(material)
         gather_hits = self.store.read(f"views/{self.index}/gather_hits", rows.start, rows.stop)
         pattern = make_material_pattern(self.store, self.index, material)
-        return GatherRays(gather_hits, pattern, no_light(), self.neighbor_filter(material))
+        return GatherRays(gather_hits, pattern, no_light(), self._neighbor_filter(material))
 
     def mirror_lights(self, material: int) -> Shaped[NDArray[np.uint8], "n bytes"]:
         """Read the virtual lights in planar mirrors that a material's samples see, as bits."""
@@ -242,9 +242,7 @@ class View:
         if isinstance(self.store, RayTracing):
             self.store.trace_gather_rays(self.rows(material).start, is_canceled)
 
-    def neighbor_filter(self, material: int) -> NeighborFilter:
-        """Return the filter over neighboring samples of a material."""
-
+    def _neighbor_filter(self, material: int) -> NeighborFilter:
         def build_filter() -> NeighborFilter:
             num_passes = int(self.store.attributes.get("gather_filter_passes", 1))
             return make_neighbor_filter(

@@ -17,7 +17,6 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.live.fixed_camera.illumination import Illumination, LightSource
     from relume.look import EnvironmentKey, LightGeometry
     from relume.operators.image_cache import ImageFiles
-    from relume.patches.neighbor_filter import NeighborFilter
     from relume.raytrace.moving_light import MovingLight
     from relume.raytrace.surface_points import SurfacePoints
     from relume.scene.model import Camera
@@ -74,11 +73,6 @@ class Samples(Protocol):
     @property
     def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"] | None: ...
     @property
-    def neighbor_filter(self) -> NeighborFilter | None:
-        """The filter over neighboring samples; None if they are not neighbors."""
-        ...
-
-    @property
     def num_bytes(self) -> int:
         """Memory that they take."""
         ...
@@ -89,6 +83,10 @@ class Samples(Protocol):
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
         """Return their gather rays, without light; missing ones are traced. None if they have none."""
+        ...
+
+    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
+        """Return the change of normals and view directions in each sample's part of a pixel, or `NO_FOOTPRINT`."""
         ...
 
     def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:

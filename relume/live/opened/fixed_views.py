@@ -34,20 +34,19 @@ from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
-from relume.patches.neighbor_filter import NeighborFilter
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
-from relume.transport.lobe_hits import LobeHits
+from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
 from relume.transport.lobe_rays import NO_ENVIRONMENT, LobeEnvironment, LobeRays
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
+from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
-_SHARED_MEDIAN = np.radians(1.5)  # of a lobe that is wider than the normals of shared neighbors differ
 
 F32 = NDArray[np.float32]
 FindLights = Callable[[EnvironmentKey, LightQuality], TriangleLights]
@@ -251,11 +250,11 @@ class BakedFixedViews:
         narrow = tuple(reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances)
         key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
         tint, share = self._lobe_patches(reflectances)
-        trace_args = receivers, pattern, reflectances if any(narrow) else (), tint, is_canceled
+        footprint = samples.pixel_footprint(receivers)
+        trace_args = receivers, footprint, pattern, reflectances if any(narrow) else (), tint, is_canceled
         hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(*trace_args))
         environment = self._lobe_environment(light) if light.has_environment else NO_ENVIRONMENT
-        sharing = samples.neighbor_filter if lobe.median > _SHARED_MEDIAN else None
-        return LobeRays(hits, pattern, self._patch_light(light, is_canceled), environment, share, sharing)
+        return LobeRays(hits, pattern, self._patch_light(light, is_canceled), environment, share, footprint)
 
     def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
         """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
@@ -363,10 +362,14 @@ class MaterialSamples:
         """The virtual lights that the samples see in planar mirrors."""
         return self.view.mirror_lights(self.material)
 
-    @property
-    def neighbor_filter(self) -> NeighborFilter:
-        """The filter over neighboring samples."""
-        return self.view.neighbor_filter(self.material)
+    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
+        """Return the change of normals and view directions in pixels. See `Samples`."""
+        view = self.view
+
+        def compute() -> F32:
+            return pixel_footprint(view.pixel[view.rows(self.material)], view.width, receivers.points, receivers.wo)
+
+        return self.cache.transient.get_value((*self.key, "pixel footprint"), compute)
 
     def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
         """Return the hits of lobe rays, cached until the memory is needed."""
@@ -398,7 +401,6 @@ class SelectedSamples:
     local: LocalLights
     stored_rays: GatherRays | None = None
     mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
-    neighbor_filter = None
 
     @property
     def num_bytes(self) -> int:
@@ -415,6 +417,10 @@ class SelectedSamples:
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
         """Return the gather rays, without light."""
         return self.stored_rays
+
+    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
+        """Return no change within a pixel: the points are not neighbors."""
+        return NO_FOOTPRINT
 
     def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
         """Return the hits of lobe rays."""

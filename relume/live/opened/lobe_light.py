@@ -30,7 +30,7 @@ F32 = NDArray[np.float32]
 _ALBEDO_STEPS = 64
 _PEAK, _PEAK_ROWS, _COARSE_ROWS = 8, 4, 64  # brightness of peaks by the mean; rows of maps
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
-_NUM_RAYS = ((0.3, 34), (1.0, 55), (2.5, 144), (90.0, 233))
+_NUM_RAYS = ((1.0, 144), (90.0, 233))
 """Rays of lobes whose median is up to so many degrees."""
 
 
@@ -52,6 +52,7 @@ class LobeTracer:
     def trace(
         self,
         receivers: ShadingPoints,
+        footprint: Shaped[F32, "#n 2 2 3"],
         pattern: LobePattern,
         reflectances: Reflectances,
         tint: Shaped[F32, "patches 3"],
@@ -60,11 +61,11 @@ class LobeTracer:
         """Trace the rays of points. See `trace_lobe_rays`.
 
         Args:
-            receivers: the points. pattern: their rays.
+            receivers: the points. footprint: of each in its pixel. pattern: their rays.
             reflectances: of all materials; rays go on from narrow lobes. Empty: rays end at the first surface.
             tint: mean of the specular texture of each patch. is_canceled: polled.
         """
-        points_args = receivers.points, receivers.wo, receivers.level
+        points_args = receivers.points, receivers.wo, footprint, receivers.level
         surfaces = self._surfaces(reflectances, tint)
         return trace_lobe_rays(self._tracer.geometry, self._lookup, surfaces, *points_args, pattern, is_canceled)
 
