@@ -50,36 +50,41 @@ F32 = NDArray[np.float32]
 _POINTS_PER_RANGE = 256
 _HALF, _ONE, _TWO = np.float32(0.5), np.float32(1), np.float32(2)
 _MAX_REFLECTIONS = 4
+END, ESCAPE, REFLECTION = np.uint8(0), np.uint8(1), np.uint8(2)
+"""Kinds of entries in `LobePaths`."""
+
 _PIXEL_SEED = np.uint32(0x5BD1E995)
 _MIN_COSINE = np.float32(1e-3)
 _HALF_WIDTH = 1.25  # of a square, by the spread of uniform points in it
 
 
 class LobePaths(NamedTuple):
-    """Lobe rays that went on from surfaces with narrow lobes, point by point in the order of their rays.
+    """Lobe rays that went on from surfaces with narrow lobes: where they reflect and end, point by point, ray by ray.
 
     Attributes:
-        first: begin of each point's paths. ray: index of each path's ray.
-        patch: patch at its end, `NO_PATCH` for none. has_escaped: 1 if it left the scene.
-        throughput: product of the albedos of its surfaces. direction: of its last ray, world space.
-        blur: angle over which the environment is averaged, radians.
+        first: begin of each point's entries. ray: index of the ray.
+        kind: `END`, `ESCAPE` or `REFLECTION`. The last is stored for wide lobes, which the peaks of the environment
+            light directly.
+        patch: patch of the end or reflection, `NO_PATCH` for none. lobe: row in `LobeSurfaces` of the newest lobe.
+        throughput: product of the albedos so far. direction: of the newest ray; of a reflection its wo, world space.
+        normal: of a reflection.
     """
 
     first: Shaped[NDArray[np.int64], " ends"]
     ray: Shaped[NDArray[np.uint16], " K"]
+    kind: Shaped[NDArray[np.uint8], " K"]
     patch: Shaped[NDArray[np.uint16], " K"]
-    has_escaped: Shaped[NDArray[np.uint8], " K"]
+    lobe: Shaped[NDArray[np.uint8], " K"]
     throughput: Shaped[F32, "K 3"]
     direction: Shaped[F32, "K 3"]
-    blur: Shaped[F32, " K"]
+    normal: Shaped[F32, "K 3"]
 
     @classmethod
-    def allocate(cls, num_points: int, num_paths: int) -> LobePaths:
-        """Allocate memory for paths."""
-        patch, ray, has_escaped = *np.empty((2, num_paths), np.uint16), np.empty(num_paths, np.uint8)
-        throughput, direction = np.empty((2, num_paths, 3), np.float32)
-        blur = np.empty(num_paths, np.float32)
-        return cls(np.zeros(num_points + 1, np.int64), ray, patch, has_escaped, throughput, direction, blur)
+    def allocate(cls, num_points: int, num_entries: int) -> LobePaths:
+        """Allocate memory for entries."""
+        (ray, patch), (kind, lobe) = np.empty((2, num_entries), np.uint16), np.empty((2, num_entries), np.uint8)
+        vectors = np.empty((3, num_entries, 3), np.float32)
+        return cls(np.zeros(num_points + 1, np.int64), ray, kind, patch, lobe, *vectors)
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
         """Select the paths of some points."""
@@ -99,8 +104,8 @@ class _Lanes(NamedTuple):
 
     Attributes:
         seeds: of the points. keys: position and normal of each hit, moved by `_jitter`. roots: of its side.
-        patches: of the newest hits. last: patch of each path's end. throughput, blur, has_escaped: as in `LobePaths`.
-        is_path: whether the ray has met a narrow lobe.
+        patches: of the newest hits. last: patch of each path's end. lobe: its newest lobe, −1 before one is met.
+        throughput: as in `LobePaths`. normal: of the newest reflection. has_escaped: whether the ray left the scene.
     """
 
     seeds: Shaped[NDArray[np.uint32], " lanes"]
@@ -108,18 +113,18 @@ class _Lanes(NamedTuple):
     roots: Shaped[NDArray[np.int32], " lanes"]
     patches: Shaped[NDArray[np.int32], " lanes"]
     last: Shaped[NDArray[np.int32], " lanes"]
+    lobe: Shaped[NDArray[np.int32], " lanes"]
     throughput: Shaped[F32, "3 lanes"]
-    blur: Shaped[F32, " lanes"]
+    normal: Shaped[F32, "3 lanes"]
     has_escaped: Shaped[NDArray[np.bool_], " lanes"]
-    is_path: Shaped[NDArray[np.bool_], " lanes"]
 
 
 @nb.njit(nogil=True, cache=True)
 def _allocate_lanes():  # type: ignore[no-untyped-def]
     return _Lanes(
         np.zeros(LANES, np.uint32), np.zeros((6, LANES), np.float32), np.zeros(LANES, np.int32),
-        np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros((3, LANES), np.float32),
-        np.zeros(LANES, np.float32), np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_),
+        np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros(LANES, np.int32),
+        np.zeros((3, LANES), np.float32), np.zeros((3, LANES), np.float32), np.zeros(LANES, np.bool_),
     )  # fmt: skip
 
 
@@ -130,9 +135,9 @@ class LobeSurfaces(NamedTuple):
         faces: corners of the triangles. face_material: their materials.
         normals: of the corners; empty if only those of the triangles are known.
         lobe: row of each material in the following arrays, −1 if rays end there.
-        quantile, is_half_angle: as in `LobeSampling`, at one level.
+        quantile, band_density, is_half_angle, scale: as in `LobePattern`, at one level.
         albedo: directional albedo at equal steps of cos θo from 0 to 1.
-        blur: see `LobePaths`.
+        blur: angle over which the environment is averaged behind a wide lobe, radians; zero for others.
         tint: mean of the specular texture of each patch; ones in row `NO_PATCH`.
         offset: of ray origins from surfaces, meters.
     """
@@ -142,11 +147,30 @@ class LobeSurfaces(NamedTuple):
     normals: Shaped[F32, "corners 3"]
     lobe: Shaped[NDArray[np.int32], " materials"]
     quantile: Shaped[F32, "S quantiles"]
+    band_density: Shaped[F32, "S bands"]
     is_half_angle: Shaped[NDArray[np.bool_], " S"]
+    scale: Shaped[F32, " S"]
     albedo: Shaped[F32, "S steps 3"]
     blur: Shaped[F32, " S"]
     tint: Shaped[F32, "patches 3"]
     offset: float
+
+
+NO_SURFACES = LobeSurfaces(
+    faces=np.empty((0, 3), np.uint32),
+    face_material=np.empty(0, np.int32),
+    normals=np.empty((0, 3), np.float32),
+    lobe=np.empty(0, np.int32),
+    quantile=np.empty((0, 0), np.float32),
+    band_density=np.empty((0, 0), np.float32),
+    is_half_angle=np.empty(0, np.bool_),
+    scale=np.empty(0, np.float32),
+    albedo=np.empty((0, 0, 3), np.float32),
+    blur=np.empty(0, np.float32),
+    tint=np.empty((0, 3), np.float32),
+    offset=0.0,
+)
+"""Of a scene in which all rays end at the first surface."""
 
 
 @dataclass(frozen=True)
@@ -305,16 +329,18 @@ def _normal_at_hit(packet, k, face, face_normal, surfaces):  # type: ignore[no-u
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _reflect(packet, k, lobe, random, face_normal, surfaces, throughput):  # type: ignore[no-untyped-def]
+def _reflect(packet, k, lobe, random, face_normal, surfaces, throughput, normal):  # type: ignore[no-untyped-def]
     """Aim a lane along the lobe of the surface that it hits; return False if the light is absorbed.
 
     Args:
         packet: its ray is replaced. k: the lane. lobe: row in `LobeSurfaces`. random: two numbers in [0, 1).
         face_normal: of all faces. surfaces: `LobeSurfaces`. throughput: multiplied by the albedo. (3, `LANES`)
+        normal: of the surface, written. (3, `LANES`)
     """
     face, _ = get_hit(packet, k)
     n, f = _normal_at_hit(packet, k, face, face_normal, surfaces)
     t, b = tangents_of(n)
+    normal[0, k], normal[1, k], normal[2, k] = n
     dx, dy, dz = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)
     ox, oy = -(t[0] * dx + t[1] * dy + t[2] * dz), -(b[0] * dx + b[1] * dy + b[2] * dz)
     oz = min(max(-(n[0] * dx + n[1] * dy + n[2] * dz), np.float32(1e-4)), _ONE)
@@ -348,6 +374,16 @@ def _locate_smoothly(packet, ray, lookup, lanes):  # type: ignore[no-untyped-def
     locate(tree, lanes.keys, patches)
 
 
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def _store(paths, entry, point, ray, kind, patch, lanes, k, direction):  # type: ignore[no-untyped-def]
+    """Write an entry of paths, with the point in `first`; its throughput, lobe and normal are those of lane k."""
+    paths.first[entry], paths.ray[entry], paths.kind[entry], paths.patch[entry] = point, ray, kind, patch
+    paths.lobe[entry] = lanes.lobe[k]
+    for axis in range(3):
+        paths.throughput[entry, axis], paths.normal[entry, axis] = lanes.throughput[axis, k], lanes.normal[axis, k]
+        paths.direction[entry, axis] = direction[axis]
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end):  # type: ignore[no-untyped-def]
     """Follow the rays of all lanes that hit a narrow lobe, and store their ends.
@@ -359,9 +395,9 @@ def _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths,
     Returns:
         New number of paths.
     """
-    seeds, _, _, patches, last, throughput, blur, has_escaped, is_path = lanes
+    seeds, _, _, patches, last, lobes, throughput, normal, has_escaped = lanes
     for k in range(LANES):
-        is_path[k], has_escaped[k], last[k] = False, False, patches[k]
+        lobes[k], has_escaped[k], last[k] = -1, False, patches[k]
         throughput[0, k] = throughput[1, k] = throughput[2, k] = _ONE
     for depth in range(1, _MAX_REFLECTIONS + 1):
         num_active = 0
@@ -372,9 +408,13 @@ def _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths,
             if lobe >= 0:
                 for channel in range(3):
                     throughput[channel, k] *= surfaces.tint[last[k], channel]
-                random = ray_jitter(ray + depth * num_rays, seeds[k])
-                is_path[k], blur[k], last[k] = True, surfaces.blur[lobe], NO_PATCH
-                is_reflected = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput)
+                random, patch = ray_jitter(ray + depth * num_rays, seeds[k]), last[k]
+                view = -get_direction(packet, k, 0), -get_direction(packet, k, 1), -get_direction(packet, k, 2)
+                is_reflected = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput, normal)
+                lobes[k], last[k] = lobe, NO_PATCH
+                if surfaces.blur[lobe] > 0 and k < width:
+                    _store(paths, end, first + k, ray, REFLECTION, patch, lanes, k, view)
+                    end += 1
             enable_lane(packet, k, is_reflected)
             num_active += is_reflected
         if num_active == 0:
@@ -385,12 +425,10 @@ def _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths,
             if packet.is_active[k] != 0:
                 last[k], has_escaped[k] = patches[k], get_hit(packet, k)[0] < 0
     for k in range(width):
-        if is_path[k]:
-            paths.first[end], paths.ray[end], paths.patch[end] = first + k, ray, last[k]
-            paths.has_escaped[end], paths.blur[end] = has_escaped[k], blur[k]
-            for axis in range(3):
-                paths.throughput[end, axis] = throughput[axis, k]
-                paths.direction[end, axis] = get_direction(packet, k, axis)
+        if lobes[k] >= 0:
+            direction = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)
+            kind = ESCAPE if has_escaped[k] and last[k] == NO_PATCH else END
+            _store(paths, end, first + k, ray, kind, last[k], lanes, k, direction)
             end += 1
     return end
 
@@ -464,7 +502,7 @@ def trace_lobe_rays(
     found: dict[int, LobePaths] = {}
 
     def kernel(start: int, stop: int) -> None:
-        capacity = (stop - start) * num_rays if len(surfaces.quantile) else 0
+        capacity = (stop - start) * num_rays * (1 + _MAX_REFLECTIONS) if len(surfaces.quantile) else 0
         paths = LobePaths.allocate(capacity - 1, capacity)
         num_paths = _trace(*args, start, stop, patch, escapes, paths)
         order = np.argsort(paths.first[:num_paths], kind="stable")

@@ -29,7 +29,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
 from relume.transport.gather_kernel import in_frame
 from relume.transport.light_culling import ListedLights, half_angle_reach
-from relume.transport.lobe_hits import LobeHits, lobe_ray_in_pixel
+from relume.transport.lobe_hits import ESCAPE, REFLECTION, LobeHits, LobeSurfaces, lobe_ray_in_pixel
 from relume.transport.outgoing_patch_light import OutgoingLight, bin_of
 from relume.transport.shading_points import ListedRays, ShadingPoints
 
@@ -49,7 +49,7 @@ class LobeEnvironment(NamedTuple):
         tile: triangle of each texel.
         rotation: cosine and sine of the map's rotation about +Y.
         direction, radius, solid_angle: of the triangles.
-        texels, levels: the map at halved sizes down to one row; begin, height and width of each in `texels`.
+        texels, levels: the map without its peaks, at halved sizes down to one row; begin, height and width of each.
         is_direct: rays that leave the scene at once bring its light; others always do.
     """
 
@@ -77,6 +77,22 @@ NO_ENVIRONMENT = LobeEnvironment(
 )
 
 
+class LobePeaks(NamedTuple):
+    """Peaks of the environment, which light wide lobes that lobe rays meet.
+
+    Attributes:
+        direction: unit. irradiance: on a surface perpendicular to it, of the light above the limit of the map.
+        visible: fraction of each patch's points that see it; zero in row `NO_PATCH`.
+    """
+
+    direction: Shaped[F32, "K 3"]
+    irradiance: Shaped[F32, "K 3"]
+    visible: Shaped[F32, "patches K"]
+
+
+NO_PEAKS = LobePeaks(*np.empty((2, 0, 3), np.float32), np.empty((0, 0), np.float32))
+
+
 @dataclass(frozen=True)
 class LobeRays:
     """Rays of the lobe of a term; a `relume.transport.shading_points.RayList`.
@@ -86,6 +102,7 @@ class LobeRays:
         outgoing: outgoing radiance of the patches. environment: light of the rays that leave the scene.
         broad_share: share of each patch's isotropic radiance that its narrow lobe does not reflect.
         footprint: of each point, see `trace_lobe_rays`.
+        surfaces: that rays go on from. peaks: of the environment.
     """
 
     hits: LobeHits
@@ -94,6 +111,8 @@ class LobeRays:
     environment: LobeEnvironment
     broad_share: Shaped[F32, " patches"]
     footprint: Shaped[F32, "#n 2 2 3"]
+    surfaces: LobeSurfaces
+    peaks: LobePeaks
 
     @property
     def max_rays_per_point(self) -> int:
@@ -108,7 +127,7 @@ class LobeRays:
     def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
         r, point_args = receivers, (self.footprint, _levels(receivers))
-        light_args = self.outgoing, self.broad_share, self.environment
+        light_args = self.outgoing, self.broad_share, self.environment, self.surfaces, self.peaks
         hits = self.hits.patch, self.hits.escapes, self.hits.paths
         return int(_list_lobe_rays(r.points, r.wo, *point_args, hits, self.pattern, light_args, start, stop, listed))
 
@@ -231,9 +250,17 @@ def _from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _blurred_environment(environment, blur, world):  # type: ignore[no-untyped-def]
-    """Radiance of the environment averaged over about an angle, radians. world: world-space direction"""
-    height = environment.radiance.shape[0]
+def _seen_behind(environment, blur, world):  # type: ignore[no-untyped-def]
+    """Radiance of the environment behind a lobe: its texel, or behind a wide lobe a blurred texel without peaks.
+
+    Args:
+        blur: of `LobeSurfaces`. world: world-space direction.
+    """
+    height, width = environment.tile.shape
+    if blur == 0:
+        row, column = _texel(environment.rotation, height, width, world, (_HALF, _HALF))
+        texel = environment.radiance[row, column]
+        return texel[0], texel[1], texel[2]
     texels = blur * _TWO * np.float32(height) * _PER_PI
     level = min(int(math.log2(max(texels, _ONE))), environment.levels.shape[0] - 1)
     begin, rows, columns = environment.levels[level, 0], environment.levels[level, 1], environment.levels[level, 2]
@@ -243,17 +270,53 @@ def _blurred_environment(environment, blur, world):  # type: ignore[no-untyped-d
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _along_path(paths, index, outgoing, environment, has_environment):  # type: ignore[no-untyped-def]
-    """Radiance that a path brings from its end, times its throughput."""
-    d = paths.direction[index]
+def _from_peaks(peaks, surfaces, lobe, patch, n, o):  # type: ignore[no-untyped-def]
+    """Light of the peaks that a lobe reflects, by its density: the albedo is in the throughput.
+
+    Args:
+        lobe: row in `LobeSurfaces`. patch: where the peaks may be visible. n, o: normal and wo, world space.
+    """
     red = green = blue = _ZERO
-    if paths.has_escaped[index] == 0:
-        if paths.patch[index] != NO_PATCH:
-            red, green, blue = _from_patch(outgoing, paths.patch[index], (d[0], d[1], d[2]))
-    elif has_environment:
-        red, green, blue = _blurred_environment(environment, paths.blur[index], (d[0], d[1], d[2]))
-    throughput = paths.throughput[index]
-    return throughput[0] * red, throughput[1] * green, throughput[2] * blue
+    mirrored = _TWO * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
+    for k in range(peaks.direction.shape[0]):
+        visible, d = peaks.visible[patch, k], peaks.direction[k]
+        if visible == 0 or n[0] * d[0] + n[1] * d[1] + n[2] * d[2] <= 0:
+            continue
+        if surfaces.is_half_angle[lobe]:
+            hx, hy, hz = d[0] + o[0], d[1] + o[1], d[2] + o[2]
+            length = np.float32(math.sqrt(hx * hx + hy * hy + hz * hz)) + np.float32(1e-6)
+            angle, jacobian = acos_clamped((n[0] * hx + n[1] * hy + n[2] * hz) / length), _HALF / length
+        else:
+            cosine = d[0] * (mirrored * n[0] - o[0]) + d[1] * (mirrored * n[1] - o[1]) + d[2] * (mirrored * n[2] - o[2])
+            angle, jacobian = acos_clamped(cosine), _ONE
+        band = min(int(surfaces.scale[lobe] * angle), surfaces.band_density.shape[1] - 1)
+        density = visible * jacobian * surfaces.band_density[lobe, band]
+        red += density * peaks.irradiance[k, 0]
+        green += density * peaks.irradiance[k, 1]
+        blue += density * peaks.irradiance[k, 2]
+    return red, green, blue
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _along_path(paths, first, last, outgoing, environment, surfaces, peaks):  # type: ignore[no-untyped-def]
+    """Radiance that the entries [first, last) of a path bring to its ray."""
+    red = green = blue = _ZERO
+    for entry in range(first, last):
+        kind, patch, lobe, d = paths.kind[entry], paths.patch[entry], paths.lobe[entry], paths.direction[entry]
+        light, direction = (_ZERO, _ZERO, _ZERO), (d[0], d[1], d[2])
+        if kind == REFLECTION:
+            if peaks.direction.shape[0] > 0:
+                n = paths.normal[entry]
+                light = _from_peaks(peaks, surfaces, lobe, patch, (n[0], n[1], n[2]), direction)
+        elif kind == ESCAPE:
+            if environment.radiance.shape[0] > 0:
+                light = _seen_behind(environment, surfaces.blur[lobe], direction)
+        elif patch != NO_PATCH:
+            light = _from_patch(outgoing, patch, direction)
+        red += paths.throughput[entry, 0] * light[0]
+        green += paths.throughput[entry, 1] * light[1]
+        blue += paths.throughput[entry, 2] * light[2]
+    return red, green, blue
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -262,12 +325,13 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
 
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) footprint: of `LobeRays`. level: roughness levels, or one.
-        hits: the fields of `LobeHits`. pattern: of `LobeRays`. light_args: its outgoing, broad_share and environment.
+        hits: the fields of `LobeHits`. pattern: of `LobeRays`.
+        light_args: its outgoing, broad_share, environment, surfaces and peaks.
         listed: `ListedRays`, written.
     Returns:
         K, the number of rays.
     """
-    (patch, escapes, paths), (outgoing, broad_share, environment) = hits, light_args
+    (patch, escapes, paths), (outgoing, broad_share, environment, surfaces, peaks) = hits, light_args
     wi, end, has_environment = listed.wi, 0, environment.radiance.shape[0] > 0
     is_direct = has_environment and environment.is_direct
     for p in range(start, stop):
@@ -277,8 +341,10 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
         point_level, spread = level[min(p, level.shape[0] - 1)], _spread(footprint, p)
         shift, path, last_path = lobe_shift(pattern, points.seed[p]), paths.first[p], paths.first[p + 1]
         for ray in range(patch.shape[1]):
-            is_path = path < last_path and paths.ray[path] == ray
-            path += is_path
+            first_entry = path
+            while path < last_path and paths.ray[path] == ray:
+                path += 1
+            is_path = path > first_entry
             hit, is_escaping = patch[p, ray], (escapes[p, ray >> 3] >> (ray & 7)) & 1
             if (hit == NO_PATCH and not is_escaping and not is_path) or (is_escaping and not is_direct):
                 continue
@@ -292,7 +358,7 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
                 jitter = ray_jitter(ray, points.seed[p])
                 light = _from_environment(environment, pattern, point_level, spread, (t, b, n), world, jitter, o)
             elif is_path:
-                red, green, blue = _along_path(paths, path - 1, outgoing, environment, has_environment)
+                red, green, blue = _along_path(paths, first_entry, path, outgoing, environment, surfaces, peaks)
                 share = broad_share[hit]
                 light = (
                     red + share * outgoing.isotropic[hit, 0],

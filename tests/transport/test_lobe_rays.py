@@ -19,8 +19,8 @@ from relume.lights.spherical_triangles import EnvironmentTexels, integrate_envir
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
-from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits, no_paths
-from relume.transport.lobe_rays import NO_ENVIRONMENT, LobeRays
+from relume.transport.lobe_hits import NO_FOOTPRINT, NO_SURFACES, LobeHits, no_paths
+from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeRays
 from relume.transport.outgoing_patch_light import isotropic, no_light
 from relume.transport.shading.shader import Shader
 from relume.transport.shading_points import build_ray_lists
@@ -54,8 +54,8 @@ def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotat
         no_paths(len(normal)),
     )
     tile = tile_of_texels(tiles, radiance.shape[:2], rotation)
-    environment = lobe_environment(radiance, tile, rotation, lights, is_direct=True)
-    rays = LobeRays(hits, pattern, no_light(), environment, NO_SHARE, NO_FOOTPRINT)
+    environment = lobe_environment(radiance, tile, rotation, lights, radiance, is_direct=True)
+    rays = LobeRays(hits, pattern, no_light(), environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), visible)
     return lights, ref.only_above(replace(points, rays=(rays,)), lights)
@@ -148,7 +148,7 @@ def test_rays_that_hit_a_patch_bring_its_light():
     light[7] = 1, 2, 3
     hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), no_paths(NUM_POINTS))
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
-    rays = LobeRays(hits, pattern, isotropic(light), NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT)
+    rays = LobeRays(hits, pattern, isotropic(light), NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
     listed = build_ray_lists(rays, points, 0, NUM_POINTS)
     num = int(listed.first[-1])
     assert 0.99 * 27 * NUM_POINTS < num <= 27 * NUM_POINTS  # few leave below the horizon

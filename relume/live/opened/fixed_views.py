@@ -28,7 +28,7 @@ from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights,
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.indirect_solver import IndirectSolver
-from relume.live.opened.lobe_light import LobeTracer, lobe_environment, reflects_narrowly, tile_of_texels
+from relume.live.opened.lobe_light import LobeTracer, choose_peaks, lobe_environment, reflects_narrowly, tile_of_texels
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
@@ -38,7 +38,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
-from relume.transport.lobe_rays import NO_ENVIRONMENT, LobeEnvironment, LobeRays
+from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
@@ -251,16 +251,18 @@ class BakedFixedViews:
         key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
         tint, share = self._lobe_patches(reflectances)
         footprint = samples.pixel_footprint(receivers)
-        trace_args = receivers, footprint, pattern, reflectances if any(narrow) else (), tint, is_canceled
+        surfaces = self._lobe_tracer.surfaces(reflectances if any(narrow) else (), tint)
+        trace_args = receivers, footprint, pattern, surfaces, is_canceled
         hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(*trace_args))
-        environment = self._lobe_environment(light) if light.has_environment else NO_ENVIRONMENT
-        return LobeRays(hits, pattern, self._patch_light(light, is_canceled), environment, share, footprint)
+        environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
+        light_args = self._patch_light(light, is_canceled), environment, share
+        return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks)
 
     def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
         """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
         return np.ones((NO_PATCH + 1, 3), np.float32), np.ones(NO_PATCH + 1, np.float32)
 
-    def _lobe_environment(self, light: Illumination) -> LobeEnvironment:
+    def _lobe_environment(self, light: Illumination) -> tuple[LobeEnvironment, LobePeaks]:
         key, rotation = light.environment, light.environment.rotation
         radiance, lights = self.environment_map(key.map), self.environment_lights(key, LightQuality.EXACT)
         tile = self.cache.get_value(
@@ -268,7 +270,13 @@ class BakedFixedViews:
         )
         gain = np.array(light.environment_gain, np.float32)
         weighted = radiance if np.all(gain == 1) else radiance * gain
-        return lobe_environment(weighted, tile, rotation, lights, is_direct=light.paths.direct)
+        peaks, irradiance, without_peaks = choose_peaks(weighted, tile, lights)
+        environment = lobe_environment(weighted, tile, rotation, lights, without_peaks, is_direct=light.paths.direct)
+        return environment, LobePeaks(lights.direction[peaks], irradiance, self._patch_visibility(peaks))
+
+    def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
+        """Return the fraction of each patch's points that see some light triangles: there are no patches."""
+        return np.zeros((NO_PATCH + 1, len(lights)), np.float32)
 
     def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
         """Return the outgoing light of patches: there are none."""

@@ -128,6 +128,12 @@ class BakedIndirectViews(BakedFixedViews):
             share[:num] = np.array([broad_share(reflectance) for reflectance in reflectances], np.float32)[material]
         return tint, share
 
+    def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
+        """Return the fraction of each patch's points that see some light triangles."""
+        out, bits = super()._patch_visibility(lights), self.patches.visible[:, :, lights >> 3] >> (lights & 7) & 1
+        out[: len(bits)] = bits.mean(axis=1)
+        return out
+
     def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
     ) -> tuple[RayList, ...]:

@@ -9,7 +9,12 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.environments.equirect import halve_to_width, rotate_about_y, texel_directions
+from relume.assets.environments.equirect import (
+    halve_to_width,
+    rotate_about_y,
+    texel_directions,
+    texel_solid_angles,
+)
 from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
 from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS
@@ -28,7 +33,9 @@ from relume.transport.shading_points import ShadingPoints
 F32 = NDArray[np.float32]
 
 _ALBEDO_STEPS = 64
-_PEAK, _PEAK_ROWS, _COARSE_ROWS = 8, 4, 64  # brightness of peaks by the mean; rows of maps
+_PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
+_MAX_LOBES = 255
+_WIDE = np.radians(1.0)  # median of a lobe in which suns are no texels
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _NUM_RAYS = ((1.0, 144), (90.0, 233))
 """Rays of lobes whose median is up to so many degrees."""
@@ -54,38 +61,51 @@ class LobeTracer:
         receivers: ShadingPoints,
         footprint: Shaped[F32, "#n 2 2 3"],
         pattern: LobePattern,
-        reflectances: Reflectances,
-        tint: Shaped[F32, "patches 3"],
+        surfaces: LobeSurfaces,
         is_canceled: Callable[[], bool],
     ) -> LobeHits:
         """Trace the rays of points. See `trace_lobe_rays`.
 
         Args:
             receivers: the points. footprint: of each in its pixel. pattern: their rays.
-            reflectances: of all materials; rays go on from narrow lobes. Empty: rays end at the first surface.
-            tint: mean of the specular texture of each patch. is_canceled: polled.
+            surfaces: that rays go on from. is_canceled: polled.
         """
         points_args = receivers.points, receivers.wo, footprint, receivers.level
-        surfaces = self._surfaces(reflectances, tint)
         return trace_lobe_rays(self._tracer.geometry, self._lookup, surfaces, *points_args, pattern, is_canceled)
 
-    def _surfaces(self, reflectances: Reflectances, tint: F32) -> LobeSurfaces:
+    def surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"]) -> LobeSurfaces:
+        """Return the surfaces that rays go on from: those with narrow lobes.
+
+        Args:
+            reflectances: of all materials. Empty: rays end at the first surface.
+            tint: mean of the specular texture of each patch.
+        """
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
-        found = [lobe for lobe in lobes if lobe is not None]
-        row = np.cumsum([lobe is not None for lobe in lobes]) - 1 if lobes else np.zeros(0, np.int64)
-        row[[lobe is None for lobe in lobes]] = -1
-        size = (len(found), 0) if not found else np.stack([lobe.quantile[0] for lobe, _ in found]).shape
-        quantile, albedo = np.empty(size, np.float32), np.empty((len(found), _ALBEDO_STEPS, 3), np.float32)
-        for k, (lobe, documents) in enumerate(found):
-            theta_o, values = directional_albedo(documents)
-            cosine = np.linspace(0, 1, _ALBEDO_STEPS)
-            quantile[k] = lobe.quantile[0]
-            albedo[k] = np.stack([np.interp(cosine, np.cos(theta_o)[::-1], v[::-1]) for v in values.T], axis=1)
-        is_half_angle = np.array([lobe.is_half_angle for lobe, _ in found], np.bool_)
-        blur = np.array([_BLUR * lobe.median for lobe, _ in found], np.float32)
-        mesh_args = geometry.faces, geometry.face_material, self._normals
+        found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
+        row = np.full(len(geometry.face_material) and int(geometry.face_material.max()) + 1, -1, np.int32)
+        for k, index in enumerate([index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]):
+            row[index] = k
+        quantile, band_density = (
+            _padded([lobe.quantile[0] for lobe, _ in found]),
+            _padded([lobe.band_density[0] for lobe, _ in found]),
+        )
+        num_bands = np.array([lobe.band_density.shape[1] for lobe, _ in found], np.float32)
+        median = np.array([lobe.median for lobe, _ in found], np.float32)
         return LobeSurfaces(
-            *mesh_args, row.astype(np.int32), quantile, is_half_angle, albedo, blur, tint, geometry.epsilon
+            faces=geometry.faces,
+            face_material=geometry.face_material,
+            normals=self._normals,
+            lobe=row,
+            quantile=quantile,
+            band_density=band_density,
+            is_half_angle=np.array([lobe.is_half_angle for lobe, _ in found], np.bool_),
+            scale=np.asarray(num_bands / (np.pi / 2), np.float32),
+            albedo=np.array([_albedo_by_cosine(documents) for _, documents in found], np.float32).reshape(
+                -1, _ALBEDO_STEPS, 3
+            ),
+            blur=np.asarray(np.where(median > _WIDE, _BLUR * median, 0), np.float32),
+            tint=tint,
+            offset=geometry.epsilon,
         )
 
     @cached_property
@@ -105,6 +125,19 @@ class LobeTracer:
         except StoreError:  # direct light alone
             tree, reach = _no_patches(int(sides.max(initial=0)) + 2), patch_reach(np.empty((0, 1, 3), np.float32))
         return PatchLookup(tree, geometry.face_normals, sides, reach)
+
+
+def _padded(rows: Sequence[F32]) -> F32:
+    """Stack rows of different lengths, padded with their last value."""
+    width = max(map(len, rows), default=0)
+    return np.array([np.pad(row, (0, width - len(row)), mode="edge") for row in rows], np.float32).reshape(-1, width)
+
+
+def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "steps 3"]:
+    """Return the directional albedo of terms at equal steps of cos θo."""
+    theta_o, values = directional_albedo(documents)
+    cosine = np.linspace(0, 1, _ALBEDO_STEPS)
+    return np.stack([np.interp(cosine, np.cos(theta_o)[::-1], column[::-1]) for column in values.T], axis=1)
 
 
 def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
@@ -156,21 +189,23 @@ def _halved(radiance: F32) -> list[F32]:
     return images
 
 
-def _without_peaks(images: Sequence[F32]) -> list[F32]:
-    """Spread the peaks of coarse images widely: hardly any ray of two wide lobes meets a sun, and each would be a spot.
+def choose_peaks(
+    radiance: Shaped[F32, "height width 3"], tile: Shaped[NDArray[np.int32], "height width"], lights: TriangleLights
+) -> tuple[NDArray[np.intp], Shaped[F32, "K 3"], Shaped[F32, "height width 3"]]:
+    """Choose the brightest triangles of an environment: hardly any ray of two wide lobes meets them.
 
-    Their light stays, though not its direction.
+    Returns:
+        The triangles; the irradiance of their light above a limit, on surfaces perpendicular to it; the map without it.
     """
-    limit = _PEAK * images[0].mean(axis=(0, 1))
-    limited = _halved(np.minimum(images[0], limit))
-    spread = [image - low for image, low in zip(images, limited, strict=True)]
-    widest = next((k for k, image in enumerate(images) if len(image) <= _PEAK_ROWS), len(images) - 1)
-    out = list(images)
-    for k in range(widest):
-        if len(images[k]) <= _COARSE_ROWS:
-            factor = len(images[k]) // len(images[widest])
-            out[k] = limited[k] + np.repeat(np.repeat(spread[widest], factor, axis=0), factor, axis=1)
-    return out
+    limited = np.minimum(radiance, _PEAK * radiance.mean(axis=(0, 1)))
+    excess = (radiance - limited) * texel_solid_angles(*radiance.shape[:2])[:, None, None]
+    num, flat = lights.num_lights, tile.ravel()
+    irradiance = np.stack([np.bincount(flat, channel.ravel(), num) for channel in np.moveaxis(excess, 2, 0)], axis=1)
+    peaks = np.argsort(-irradiance.sum(axis=1), kind="stable")[:_MAX_PEAKS]
+    peaks = peaks[irradiance[peaks].sum(axis=1) > 0]
+    is_peak = np.zeros(num, np.bool_)
+    is_peak[peaks] = True
+    return peaks, irradiance[peaks].astype(np.float32), np.where(is_peak[tile][..., None], limited, radiance)
 
 
 def lobe_environment(
@@ -178,6 +213,7 @@ def lobe_environment(
     tile: Shaped[NDArray[np.int32], "height width"],
     rotation: float,
     lights: TriangleLights,
+    without_peaks: Shaped[F32, "height width 3"],
     *,
     is_direct: bool,
 ) -> LobeEnvironment:
@@ -185,13 +221,14 @@ def lobe_environment(
 
     Args:
         radiance: the map, times its gain. tile: from `tile_of_texels`. rotation: degrees. lights: its triangles.
-        is_direct: as in `LobeEnvironment`.
+        without_peaks: from `choose_peaks`. is_direct: as in `LobeEnvironment`.
     """
     cosine_sine = np.array([np.cos(np.radians(rotation)), np.sin(np.radians(rotation))], np.float32)
-    images = _without_peaks(_halved(np.ascontiguousarray(radiance, np.float32)))
+    images = _halved(np.ascontiguousarray(without_peaks, np.float32))
     shapes = np.array([image.shape[:2] for image in images])
     sizes = shapes.prod(axis=1)
     levels = np.column_stack([np.cumsum(sizes) - sizes, shapes])
     texels = np.concatenate([image.reshape(-1, 3) for image in images])
     light_args = lights.direction, lights.radius, lights.solid_angle
-    return LobeEnvironment(images[0], tile, cosine_sine, *light_args, texels, levels.astype(np.int64), is_direct)
+    arrays = np.ascontiguousarray(radiance, np.float32), tile, cosine_sine
+    return LobeEnvironment(*arrays, *light_args, texels, levels.astype(np.int64), is_direct)
