@@ -27,7 +27,7 @@ from relume.math.angle_bands import MAX_ANGLE, band_edges
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-MAX_MEDIAN = np.radians(7.0)
+MAX_MEDIAN = np.radians(3.0)
 """Wider lobes are resolved by gather rays and light triangles."""
 
 _NUM_QUANTILES = 4096
@@ -44,12 +44,14 @@ class LobeSampling(NamedTuple):
         band_density: mean density of each band of the curve per steradian: of half vectors for θh, else of wi.
         is_half_angle: whether γ is θh, else θr.
         median: of γ at the narrowest level, radians.
+        is_mixture: whether the rays serve several lobes.
     """
 
     quantile: Shaped[F32, "L quantiles"]
     band_density: Shaped[F32, "L J"]
     is_half_angle: bool
     median: float
+    is_mixture: bool
 
 
 def lobe_curve(model: str) -> Curve | None:
@@ -105,7 +107,11 @@ def mix_lobes(
         densities.append(share / (2 * np.pi * -np.diff(np.cos(edges))))
         medians.append(quantile[_NUM_QUANTILES // 2])
     return LobeSampling(
-        np.array(quantiles, np.float32), np.array(densities, np.float32), is_half_angle, float(min(medians))
+        np.array(quantiles, np.float32),
+        np.array(densities, np.float32),
+        is_half_angle,
+        float(min(medians)),
+        has_broad_part or len(documents[0]) > 1,
     )
 
 

@@ -95,7 +95,7 @@ def brute_force(term_document, normal, wo, radiance_along):
     return (value[keep][:, None] * light).sum(axis=0)
 
 
-@pytest.mark.parametrize("roughness", [0.03, 0.05, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("roughness", [0.01, 0.03, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("degrees", [0, 60])
 def test_white_light_is_reflected_without_loss_or_noise(roughness, degrees):
     chrome, (normal, wo) = document("ggx", roughness=roughness, f0=1.0), view(degrees)
@@ -114,7 +114,7 @@ def sky_with_sun():
     return radiance.astype(np.float32)
 
 
-@pytest.mark.parametrize("roughness", [0.05, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("roughness", [0.03, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("rotation", [0.0, 50.0])
 def test_rays_and_triangles_together_are_the_integral(roughness, rotation):
     """Also where the sun is in the lobe, by whichever estimator."""
@@ -130,7 +130,7 @@ def test_rays_and_triangles_together_are_the_integral(roughness, rotation):
 
 
 def test_a_sun_in_the_lobe_is_no_noise():
-    gloss, sky = document("ggx", roughness=0.3, f0=0.5), sky_with_sun()
+    gloss, sky = document("ggx", roughness=0.22, f0=0.5), sky_with_sun()
     sun = (np.argmax(sky[..., 0]) // 256 + 0.5, np.argmax(sky[..., 0]) % 256 + 0.5)
     azimuth, elevation = 2 * np.pi * (sun[1] / 256 - 0.5), np.pi * (0.5 - sun[0] / 128)
     toward = np.array([np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])

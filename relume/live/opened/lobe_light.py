@@ -37,8 +37,7 @@ _PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
 _MAX_LOBES = 255
 _WIDE = np.radians(1.0)  # median of a lobe in which suns are no texels
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
-_NUM_RAYS = ((1.0, 144), (90.0, 233))
-"""Rays of lobes whose median is up to so many degrees."""
+_NARROW_RAYS, _LOBE_RAYS, _MIXTURE_RAYS = 144, 233, 610  # of a sample
 
 
 class LobeTracer:
@@ -52,8 +51,8 @@ class LobeTracer:
         self._store, self._tracer = store, tracer
 
     def pattern(self, lobe: LobeSampling) -> LobePattern:
-        """Return the rays of every sample: fewer for a narrow lobe."""
-        num_rays = next(num for degrees, num in _NUM_RAYS if np.degrees(lobe.median) <= degrees)
+        """Return the rays of every sample: fewer for a narrow lobe, more for a slider's lobes at once."""
+        num_rays = _MIXTURE_RAYS if lobe.is_mixture else _NARROW_RAYS if lobe.median < _WIDE else _LOBE_RAYS
         return make_lobe_pattern(lobe, num_rays, int(self._store.attributes.get("gather_seed", 0)))
 
     def trace(
@@ -130,7 +129,8 @@ class LobeTracer:
 def _padded(rows: Sequence[F32]) -> F32:
     """Stack rows of different lengths, padded with their last value."""
     width = max(map(len, rows), default=0)
-    return np.array([np.pad(row, (0, width - len(row)), mode="edge") for row in rows], np.float32).reshape(-1, width)
+    padded = [np.pad(row, (0, width - len(row)), mode="edge") for row in rows]
+    return np.array(padded, np.float32).reshape(len(rows), width)
 
 
 def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "steps 3"]:
