@@ -210,7 +210,7 @@ def gather_incident_light(transfer, view: View, index, look):
 
 
 def trace_lobe_light(transfer, view: View, index, look, lobe):
-    """All light of a look at a material's samples along a narrow lobe. Its tests are tests/transport/test_lobe_rays.py"""
+    """All light of a look at a material's samples along a narrow lobe, tested in tests/transport/test_lobe_rays.py."""
     light = illumination_from_look(look, transfer.material_names, has_bounces=EditAxis.BOUNCES in transfer.axes)
     samples = transfer.samples(view, index, transfer.cache)
     return transfer.incident_light(samples, light._replace(environment_gain=look.environment.gain), lobe=lobe)

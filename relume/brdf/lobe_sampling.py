@@ -10,7 +10,7 @@ band, and the exact curve only decides where in the band it goes: lobes narrower
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,12 +28,10 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 MAX_MEDIAN = np.radians(3.0)
-"""Wider lobes are resolved by gather rays and light triangles."""
+"""Gather rays and light triangles resolve wider lobes with less error (docs/indirect-light.md#measured)."""
 
 _NUM_QUANTILES = 4096
 _SMALLEST_ANGLE = 1e-6
-_BROAD_SHARE = 0.25  # of the rays, where a drawn curve may get any shape
-_BROAD_EPSILON = 1e-4
 
 
 class LobeSampling(NamedTuple):
@@ -43,15 +41,18 @@ class LobeSampling(NamedTuple):
         quantile: angle γ at equal steps of the cumulative distribution, radians.
         band_density: mean density of each band of the curve per steradian: of half vectors for θh, else of wi.
         is_half_angle: whether γ is θh, else θr.
-        median: of γ at the narrowest level, radians.
-        is_mixture: whether the rays serve several lobes.
+        median: of γ at each level, radians.
     """
 
     quantile: Shaped[F32, "L quantiles"]
     band_density: Shaped[F32, "L J"]
     is_half_angle: bool
-    median: float
-    is_mixture: bool
+    median: Shaped[F64, " L"]
+
+    @property
+    def is_narrow(self) -> Shaped[NDArray[np.bool_], " L"]:
+        """True for levels at which rays are traced along the lobe."""
+        return np.asarray(self.median <= MAX_MEDIAN)
 
 
 def lobe_curve(model: str) -> Curve | None:
@@ -61,7 +62,7 @@ def lobe_curve(model: str) -> Curve | None:
 
 
 def sample_lobe(document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSampling | None:
-    """Return the distribution of rays for a term document; None if its lobe is wide or has no single curve.
+    """Return the distribution of rays for a term document; None if its lobe is wide at all levels, or no lobe.
 
     Args:
         document: a term of a complete look. levels: roughness levels of the samples.
@@ -69,55 +70,29 @@ def sample_lobe(document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSam
     curve = lobe_curve(document["model"])
     if curve is None:
         return None
-    sampling = mix_lobes(at_levels(document, levels), curve)
-    return sampling if sampling is not None and sampling.median <= MAX_MEDIAN else None
-
-
-def at_levels(document: Mapping[str, Any], levels: RoughnessLevels) -> list[list[Mapping[str, Any]]]:
-    """Return a term document at each roughness level, one list per level."""
-    return [[scaled_roughness(document, ratio)] for ratio in levels.ratios] or [[document]]
-
-
-def mix_lobes(
-    documents: Sequence[Sequence[Mapping[str, Any]]], curve: Curve, *, has_broad_part: bool = False
-) -> LobeSampling | None:
-    """Return the distribution for several documents at once, equally weighted; None if a curve is zero.
-
-    Args:
-        documents: of each level. curve: of their model. has_broad_part: some rays go to every angle.
-    """
-    is_half_angle = curve.angle is Angle.THETA_H
-    edges = band_edges(curve.num_bands)
+    is_half_angle, edges = curve.angle is Angle.THETA_H, band_edges(curve.num_bands)
     grid = np.unique(np.concatenate([[0.0], np.geomspace(_SMALLEST_ANGLE, MAX_ANGLE, _NUM_QUANTILES), edges]))
     measure = np.sin(grid) * (np.cos(grid) if is_half_angle else 1.0)
-    quantiles, densities, medians = [], [], []
-    for level in documents:
-        cumulative = _mean_cumulative([curve_values(document, curve, grid) * measure for document in level], grid)
+    fraction = np.linspace(0, 1, _NUM_QUANTILES + 1)
+    quantiles, densities = [], []
+    for level in [scaled_roughness(document, ratio) for ratio in levels.ratios] or [dict(document)]:
+        cumulative = _mean_cumulative(curve_values(level, curve, grid) * measure, grid)
         if cumulative is None:
             return None
-        if has_broad_part:
-            broad = np.log1p((1 - np.cos(grid)) / _BROAD_EPSILON)
-            cumulative = (1 - _BROAD_SHARE) * cumulative + _BROAD_SHARE * broad / broad[-1]
         is_rising = np.append(True, np.diff(cumulative) > 0)
-        fraction = np.linspace(0, 1, _NUM_QUANTILES + 1)
         quantile = np.interp(fraction, cumulative[is_rising], grid[is_rising])
         # of the tabulated distribution, from which rays are drawn
         share = np.diff(np.interp(edges, quantile, fraction, left=0.0, right=1.0))
         quantiles.append(quantile)
         densities.append(share / (2 * np.pi * -np.diff(np.cos(edges))))
-        medians.append(quantile[_NUM_QUANTILES // 2])
-    return LobeSampling(
-        np.array(quantiles, np.float32),
-        np.array(densities, np.float32),
-        is_half_angle,
-        float(min(medians)),
-        has_broad_part or len(documents[0]) > 1,
-    )
+    median = np.array([quantile[_NUM_QUANTILES // 2] for quantile in quantiles])
+    lobe = LobeSampling(np.array(quantiles, np.float32), np.array(densities, np.float32), is_half_angle, median)
+    return lobe if lobe.is_narrow.any() else None
 
 
-def _mean_cumulative(lobes: Sequence[Shaped[F64, "3 n"]], grid: Shaped[F64, " n"]) -> Shaped[F64, " n"] | None:
-    """Return the mean of the normalized cumulative distributions of lobes and channels; None if all are zero."""
-    cumulative = cumulative_trapezoid(np.concatenate(lobes), grid, axis=1, initial=0)
+def _mean_cumulative(lobes: Shaped[F64, "3 n"], grid: Shaped[F64, " n"]) -> Shaped[F64, " n"] | None:
+    """Return the mean of the normalized cumulative distributions of channels; None if all are zero."""
+    cumulative = cumulative_trapezoid(lobes, grid, axis=1, initial=0)
     total = cumulative[:, -1]
     if not np.all(np.isfinite(total)) or not np.any(total > 0):
         return None

@@ -10,8 +10,6 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.lobe_sampling import LobeSampling, at_levels, lobe_curve, mix_lobes, sample_lobe
-from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.term import Curve, Term
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.daubechies import analysis, forward
@@ -54,14 +52,6 @@ class EditBasis(Protocol):
         """Return the coefficients c of a term's curves, (3, J) each."""
         ...
 
-    def lobe(self, document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSampling | None:
-        """Return the distribution of lobe rays for all terms in the basis; None if all lobes are wide.
-
-        Args:
-            document: of the term, edited only along the basis. levels: roughness levels of the samples.
-        """
-        ...
-
     def columns(
         self, term: Term, bands: Mapping[str, F64], lights: TriangleLights, receivers: ShadingPoints
     ) -> Callable[[int, int], Shaped[F32, "3 samples columns"]]:
@@ -102,13 +92,6 @@ class CurveBasis:
     def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "*batch 3 columns"]:
         """Return the wavelet coefficients."""
         return analysis(bands[self.name])
-
-    def lobe(self, document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSampling | None:
-        """Return the present lobe, with rays at every angle if its own curve is edited. See `EditBasis`."""
-        lobe, curve = sample_lobe(document, levels), lobe_curve(document["model"])
-        if lobe is None or curve is None or curve.name != self.name:
-            return lobe
-        return mix_lobes(at_levels(document, levels), curve, has_broad_part=True)
 
     def columns(
         self, term: Term, bands: Mapping[str, F64], lights: TriangleLights, receivers: ShadingPoints

@@ -23,10 +23,8 @@ from numpy.typing import NDArray
 
 from relume.brdf.curve_edits import drawn_curves
 from relume.brdf.curves import curve_bands
-from relume.brdf.lobe_sampling import LobeSampling, lobe_curve, mix_lobes, sample_lobe
 from relume.brdf.parameter_sweep import curves_of_parameter, slider_values, solid_angles
 from relume.brdf.registry import TERMS
-from relume.brdf.roughness_levels import NO_LEVELS, RoughnessLevels
 from relume.brdf.term import Curve, Term
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.curve_nodes import CurveNodes, choose_nodes
@@ -105,27 +103,14 @@ class ParameterOperator:
 
     def node_bands(self) -> dict[str, F64]:
         """Return the bands of the affected curves at all nodes. (3, S, J) each"""
-        return {
-            curve.name: np.stack([curve_bands(document, curve) for document in self._node_documents()], axis=1)
-            for curve in self.curves
-        }
-
-    def lobe(self, document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSampling | None:
-        """Return the mixture of the lobes at all nodes, if the parameter changes the lobe. See `EditBasis`."""
-        curve = lobe_curve(self.model)
-        if curve is None or curve.name not in self.affected_curves:
-            return sample_lobe(document, levels)
-        lobes = [sample_lobe(node, NO_LEVELS) for node in self._node_documents()]
-        if all(lobe is None for lobe in lobes):
-            return None
-        return mix_lobes([self._node_documents()] * max(1, len(levels.ratios)), curve)
-
-    def _node_documents(self) -> list[dict[str, Any]]:
-        """Return a term document at each node."""
-        return [
+        documents = [
             _document_at(self.model, self.fixed_settings, self.parameter, values)
             for values in zip(*(n.values for n in self.nodes), strict=True)
         ]
+        return {
+            curve.name: np.stack([curve_bands(document, curve) for document in documents], axis=1)
+            for curve in self.curves
+        }
 
     def columns(
         self, term: Term, bands: Mapping[str, F64], lights: TriangleLights, receivers: ShadingPoints

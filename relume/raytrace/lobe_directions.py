@@ -35,7 +35,7 @@ class LobePattern(NamedTuple):
         uv: points on the unit square.
         sides: two edge vectors of a lattice cell.
         seed: seed of the shifts.
-        quantile, band_density, is_half_angle: as in `LobeSampling`.
+        quantile, band_density, is_half_angle, is_narrow: as in `LobeSampling`; points of other levels have no rays.
         scale: bands per radian.
     """
 
@@ -45,6 +45,7 @@ class LobePattern(NamedTuple):
     quantile: Shaped[F32, "L quantiles"]
     band_density: Shaped[F32, "L J"]
     is_half_angle: bool
+    is_narrow: Shaped[NDArray[np.bool_], " L"]
     scale: float
 
     @property
@@ -62,6 +63,7 @@ def make_lobe_pattern(sampling: LobeSampling, num_rays: int, seed: int) -> LobeP
         sampling.quantile,
         sampling.band_density,
         sampling.is_half_angle,
+        sampling.is_narrow,
         np.float32(sampling.band_density.shape[1] / (np.pi / 2)),  # type: ignore[arg-type]  # a kernel's float32
     )
 

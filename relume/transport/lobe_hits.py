@@ -275,8 +275,9 @@ def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, pack
             footprint[min(p, footprint.shape[0] - 1)], points.seed[p],
         )  # fmt: skip
         set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
-        enable_lane(packet, k, is_above and k < width)
-        num_valid += is_above and k < width
+        is_traced = is_above and k < width and pattern.is_narrow[levels[k]]
+        enable_lane(packet, k, is_traced)
+        num_valid += is_traced
     return num_valid
 
 

@@ -90,7 +90,7 @@ class LobePeaks(NamedTuple):
     visible: Shaped[F32, "patches K"]
 
 
-NO_PEAKS = LobePeaks(*np.empty((2, 0, 3), np.float32), np.empty((0, 0), np.float32))
+NO_PEAKS = LobePeaks(np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), np.empty((0, 0), np.float32))
 
 
 @dataclass(frozen=True)
@@ -186,6 +186,8 @@ def _share_triangles(pattern, footprint, level, radius, solid_angle, start, num,
     wi, wo = listed.wi, listed.wo
     for row in range(num):
         point_level, spread = level[min(start + row, level.shape[0] - 1)], _spread(footprint, start + row)
+        if not pattern.is_narrow[point_level]:
+            continue
         for entry in range(listed.first[row], listed.first[row + 1]):
             light = listed.light[entry]
             share = _triangle_share(
@@ -336,9 +338,11 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
     is_direct = has_environment and environment.is_direct
     for p in range(start, stop):
         listed.first[p - start] = end
+        point_level, spread = level[min(p, level.shape[0] - 1)], _spread(footprint, p)
+        if not pattern.is_narrow[point_level]:
+            continue
         n, t = points.normal[p], points.tangent[p]
         b, o = in_frame(n, t, wo[p])
-        point_level, spread = level[min(p, level.shape[0] - 1)], _spread(footprint, p)
         shift, path, last_path = lobe_shift(pattern, points.seed[p]), paths.first[p], paths.first[p + 1]
         for ray in range(patch.shape[1]):
             first_entry = path

@@ -45,7 +45,7 @@ def pixel_footprint(
             total[rows] += sign * np.stack(change, axis=1)
             num[rows] += 1
         out[:, :, axis] = total / np.maximum(num, 1)[:, None, None]
-    return out / np.sqrt(np.maximum(count[pixel], 1))[:, None, None, None].astype(np.float32)
+    return np.asarray(out / np.sqrt(np.maximum(count[pixel], 1))[:, None, None, None], np.float32)
 
 
 def _continues(

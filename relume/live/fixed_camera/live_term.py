@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import LobeSampling, lobe_curve, sample_lobe
 from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.specular import specular_albedo
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -55,6 +56,8 @@ class LiveTerm:
         tiles, samples = tile_layout(len(cos_theta_o))
         self.ready = self.displayed = DisplayedImage(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
+        self._lobe_document: Mapping[str, Any] | None = None
+        self._lobe: LobeSampling | None = None
         self.model: Hashable = None
         self.set_document(document)
         self.displayed, self.mirror = self.ready, self.document
@@ -88,6 +91,28 @@ class LiveTerm:
         self.target_bands, self.view_factor = target.bands, target.view_factor
         self.target_rows_key = _rows(self.target_bands, ())
         self.is_composed = False
+
+    @property
+    def lobe(self) -> LobeSampling | None:
+        """The lobe along which rays are traced in the newest look; None if it is wide."""
+        if self._lobe_document is not self.document:
+            self._lobe_document, self._lobe = self.document, sample_lobe(self.document, self.levels)
+        return self._lobe
+
+    def lobe_beside(self, basis: EditBasis) -> LobeSampling | None:
+        """Return the lobe along which the light of an operator is traced; None if the basis changes the lobe."""
+        curve = lobe_curve(self.document["model"])
+        return None if curve is None or curve.name in basis.affected_curves else self.lobe
+
+    def mark_untraced(self, image: DisplayedImage) -> DisplayedImage:
+        """Return an operator's image, marked if the operator changes the lobe, which it cannot trace."""
+        basis, curve = image.basis, lobe_curve(self.document["model"])
+        changes_lobe = basis is not None and curve is not None and curve.name in basis.affected_curves
+        return replace(image, traces_lobe=False) if changes_lobe and image.traces_lobe else image
+
+    def _is_untraced(self, image: DisplayedImage) -> bool:
+        """Return whether an image does not trace the narrow lobe of the target."""
+        return not image.traces_lobe and self.lobe is not None
 
     def update_mirror(self) -> None:
         """Update the mirror to the look; a mirror that fades is kept until its lobe can be displayed instead."""
@@ -155,7 +180,8 @@ class LiveTerm:
 
     def is_exact(self) -> bool:
         """Return whether the newest image shows the target exactly."""
-        return self.ready.fidelity == Fidelity.EXACT and not self.changed_curves()
+        ready = self.ready
+        return ready.fidelity == Fidelity.EXACT and not self.changed_curves() and not self._is_untraced(ready)
 
     def has_preview(self) -> bool:
         """Return whether a preview shows the target, so that shading may wait for the end of the drag.
@@ -177,7 +203,8 @@ class LiveTerm:
         """Fidelity of the displayed image with respect to the look."""
         displayed = self.displayed
         is_current = displayed.light == self.light and not displayed.changed_curves(self.target_bands)
-        return displayed.fidelity if is_current else min(displayed.fidelity, Fidelity.APPROXIMATE)
+        limit = Fidelity.NEAR_EXACT if self._is_untraced(displayed) else Fidelity.EXACT
+        return min(displayed.fidelity, limit if is_current else Fidelity.APPROXIMATE)
 
     def operator_key(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
         """Dependencies of an operator besides view and material: model, light, and its fixed curves."""

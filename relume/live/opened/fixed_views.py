@@ -28,7 +28,14 @@ from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights,
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.indirect_solver import IndirectSolver
-from relume.live.opened.lobe_light import LobeTracer, choose_peaks, lobe_environment, reflects_narrowly, tile_of_texels
+from relume.live.opened.lobe_light import (
+    LobeTracer,
+    choose_peaks,
+    lobe_environment,
+    only_broad,
+    reflects_narrowly,
+    tile_of_texels,
+)
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
@@ -231,8 +238,9 @@ class BakedFixedViews:
         if lobe is not None:
             lights = lights.ungrouped()
             rays.append(self._lobe_rays(samples, receivers, light, lobe, is_canceled))
-        elif light.paths.has_indirect:
-            rays.extend(self._gather_rays(samples, light, quality, is_canceled))
+        if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
+            gather_rays = self._gather_rays(samples, light, quality, is_canceled)
+            rays.extend(gather_rays if lobe is None else (only_broad(each, receivers, lobe) for each in gather_rays))
         rays += [*self._mirror_rays(samples, light), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
 
@@ -284,7 +292,7 @@ class BakedFixedViews:
 
     def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
-    ) -> tuple[RayList, ...]:
+    ) -> tuple[GatherRays, ...]:
         """Return the rays that carry indirect illumination to samples: none was baked."""
         return ()
 

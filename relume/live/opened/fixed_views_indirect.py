@@ -30,7 +30,7 @@ from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.store.bake_protocol import StoreReader
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
-from relume.transport.shading_points import RayList
+from relume.transport.shading_points import GatherRays, RayList
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
@@ -136,7 +136,7 @@ class BakedIndirectViews(BakedFixedViews):
 
     def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
-    ) -> tuple[RayList, ...]:
+    ) -> tuple[GatherRays, ...]:
         """Return the rays from patches."""
         gather_rays = samples.gather_rays(is_canceled)
         if gather_rays is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -23,12 +24,12 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.opened.retrace import NormalRetracer
 from relume.methods.patch_layout import read_tree
-from relume.patches.patch_kdtree import NO_PATCH_NODE, PatchTree
+from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.store.bake_protocol import StoreReader
 from relume.transport.lobe_hits import LobeHits, LobeSurfaces, PatchLookup, patch_reach, trace_lobe_rays
 from relume.transport.lobe_rays import LobeEnvironment
-from relume.transport.shading_points import ShadingPoints
+from relume.transport.shading_points import GatherRays, ShadingPoints
 
 F32 = NDArray[np.float32]
 
@@ -37,7 +38,7 @@ _PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
 _MAX_LOBES = 255
 _WIDE = np.radians(1.0)  # median of a lobe in which suns are no texels
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
-_NARROW_RAYS, _LOBE_RAYS, _MIXTURE_RAYS = 144, 233, 610  # of a sample
+_NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
 
 
 class LobeTracer:
@@ -51,8 +52,8 @@ class LobeTracer:
         self._store, self._tracer = store, tracer
 
     def pattern(self, lobe: LobeSampling) -> LobePattern:
-        """Return the rays of every sample: fewer for a narrow lobe, more for a slider's lobes at once."""
-        num_rays = _MIXTURE_RAYS if lobe.is_mixture else _NARROW_RAYS if lobe.median < _WIDE else _LOBE_RAYS
+        """Return the rays of every sample: fewer for a narrow lobe."""
+        num_rays = _NARROW_RAYS if lobe.median.max() < _WIDE else _LOBE_RAYS
         return make_lobe_pattern(lobe, num_rays, int(self._store.attributes.get("gather_seed", 0)))
 
     def trace(
@@ -89,7 +90,7 @@ class LobeTracer:
             _padded([lobe.band_density[0] for lobe, _ in found]),
         )
         num_bands = np.array([lobe.band_density.shape[1] for lobe, _ in found], np.float32)
-        median = np.array([lobe.median for lobe, _ in found], np.float32)
+        median = np.array([lobe.median[0] for lobe, _ in found], np.float32)
         return LobeSurfaces(
             faces=geometry.faces,
             face_material=geometry.face_material,
@@ -145,6 +146,13 @@ def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | N
     lobes = (sample_lobe(document, NO_LEVELS) for document in reflectance.lobes)
     narrow = next((lobe for lobe in lobes if lobe is not None), None)
     return None if narrow is None else (narrow, reflectance.lobes)
+
+
+def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
+    """Remove the gather rays of points whose light is traced along their lobe."""
+    is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
+    gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
+    return replace(rays, gather_hits=gather_hits)
 
 
 def reflects_narrowly(reflectance: Reflectance) -> bool:

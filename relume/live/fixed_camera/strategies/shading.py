@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
-from relume.brdf.roughness_levels import RoughnessLevels
+from relume.brdf.lobe_sampling import LobeSampling
 from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage, weighted_sum
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -42,7 +41,7 @@ class Shading:
 
     Attributes:
         key: of the image in the cache. model: of the term. bands: of its curves, (3, J) each.
-        document, levels: of the term, and the roughness levels of its samples.
+        lobe: along which rays are traced; None if it is wide.
         is_default: the look is the scene's own, whose images are cached next to the store.
     """
 
@@ -51,8 +50,7 @@ class Shading:
     term: Term
     model: Hashable
     bands: Mapping[str, F64]
-    document: Mapping[str, Any]
-    levels: RoughnessLevels
+    lobe: LobeSampling | None
     light: Illumination
     is_default: bool
 
@@ -62,7 +60,7 @@ class Shading:
         images, material, live = target
         key = images.image_key(material, live, light)
         is_default = images.is_default(material, live, light)
-        term_args = live.term, live.model, live.target_bands, live.document, live.levels
+        term_args = live.term, live.model, live.target_bands, live.lobe
         return cls(target, key, *term_args, light, is_default)
 
     def job(self, priority: Priority | None = None) -> Job:
@@ -75,11 +73,6 @@ class Shading:
     def label(self) -> str:
         """Text for the user."""
         return f"{self.target.name}, {self.term.label}"
-
-    @cached_property
-    def lobe(self) -> LobeSampling | None:
-        """The lobe along which rays are traced; None if it is wide."""
-        return sample_lobe(self.document, self.levels)
 
     @cached_property
     def light_components(self) -> Sequence[LightComponent]:
