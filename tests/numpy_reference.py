@@ -9,6 +9,7 @@ import numpy as np
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.brdf.curves import curve_bands, curve_values
 from relume.brdf.evaluate import angles_numpy
+from relume.brdf.lobe_sampling import sample_lobe
 from relume.brdf.registry import TERMS
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality
@@ -208,6 +209,13 @@ def gather_incident_light(transfer, view: View, index, look):
     return direct_lights, replace(view.receivers(index, is_lit=light.paths.direct), rays=(*gather_rays, *local))
 
 
+def trace_lobe_light(transfer, view: View, index, look, lobe):
+    """All light of a look at a material's samples along a narrow lobe, tested in tests/transport/test_lobe_rays.py."""
+    light = illumination_from_look(look, transfer.material_names, has_bounces=EditAxis.BOUNCES in transfer.axes)
+    samples = transfer.samples(view, index, transfer.cache)
+    return transfer.incident_light(samples, light._replace(environment_gain=look.environment.gain), lobe=lobe)
+
+
 def evaluate_outgoing(outgoing, patch, direction, *, is_narrow=False):
     """Outgoing radiance of a patch in a unit direction, world space; for narrow lobes without direction rings. (3,)"""
     radiance, row = outgoing.isotropic[patch].astype(float), outgoing.lobe[patch]
@@ -226,8 +234,9 @@ def shade_view(transfer, view: View, look):
         rows = view.rows(index)
         if rows.start == rows.stop:
             continue
-        lights, receivers = gather_incident_light(transfer, view, index, look)
-        for document, level_rows in split_by_roughness_level(view, index, look.materials[name].terms):
+        incident = gather_incident_light(transfer, view, index, look)
+        for document, level_rows, lobe in split_by_roughness_level(view, index, look.materials[name].terms):
+            lights, receivers = incident if lobe is None else trace_lobe_light(transfer, view, index, look, lobe)
             term = TERMS[document["model"]].normalized(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
             projector = Projector(term, contract(term, bands, None), lights, receivers)
@@ -247,18 +256,19 @@ def shade_view(transfer, view: View, look):
 
 
 def split_by_roughness_level(view: View, index, terms):
-    """Terms with their samples: one that follows a roughness map gives a term for every level."""
+    """Terms with their samples and lobes: one that follows a roughness map gives a term for every level."""
     ratios, level = view.roughness_levels(index)
     assert np.all(np.diff(level.astype(int)) >= 0)  # samples of a level are contiguous
     for term in terms:
         if not (ratios and term.get("roughness_map")):
-            yield term, slice(0, len(level))
+            yield term, slice(0, len(level)), sample_lobe(term, view.roughness_levels(index))
             continue
         assert term["model"] == "ggx"
         for k, ratio in enumerate(ratios):
-            roughness = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.03, 1).tolist()
+            roughness = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.01, 1).tolist()
             level_rows = slice(*np.searchsorted(level, [k, k + 1]))
-            yield {**term, "params": {**term["params"], "roughness": roughness}}, level_rows
+            scaled = {**term, "params": {**term["params"], "roughness": roughness}}
+            yield scaled, level_rows, sample_lobe(term, view.roughness_levels(index))
 
 
 def evaluate_emission(transfer, view: View, index, look):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -84,6 +84,15 @@ class TriangleLights:
         """Angle from each light's direction to its farthest corner, radians."""
         chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)
         return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
+
+    @cached_property
+    def solid_angle(self) -> Shaped[F32, " M"]:
+        """Solid angle of each triangle, sr: of its light, which may be smaller than its tile."""
+        return solid_angles(self.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)).astype(np.float32)
+
+    def ungrouped(self) -> TriangleLights:
+        """Return the same lights, each shaded by itself."""
+        return replace(self, codes=None)
 
     @cached_property
     def variance(self) -> Shaped[F64, " M"]:

@@ -195,6 +195,9 @@ class MeshLook(_LightLook):
 LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]
 
 
+_MANY_BOUNCES = 8  # later ones bring hardly any light
+
+
 class LightPaths(NamedTuple):
     """Light paths of an image: direct illumination and a range of bounces.
 
@@ -211,6 +214,11 @@ class LightPaths(NamedTuple):
     def has_indirect(self) -> bool:
         """True if any indirect light is included."""
         return self.last >= self.first
+
+    @property
+    def has_all_bounces(self) -> bool:
+        """True if indirect light includes the first bounce and all that matter."""
+        return self.first == 1 and self.last >= _MANY_BOUNCES
 
     def without_reflections(self) -> LightPaths:
         """These paths without indirect illumination."""

@@ -61,10 +61,10 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 
 
 def triangles_bytes(scene: Scene) -> int:
-    """Store size of the triangles: vertices, material and mesh of each, image emission, and alpha masks."""
+    """Store size of the triangles: vertices, normals, material and mesh of each, image emission, and alpha masks."""
     bytes_per_face = 12 if has_emission_images(scene) else 8
     triangles = sum(
-        mesh.positions.nbytes + mesh.faces.nbytes + bytes_per_face * len(mesh.faces) for mesh in scene.meshes
+        3 * mesh.positions.nbytes // 2 + mesh.faces.nbytes + bytes_per_face * len(mesh.faces) for mesh in scene.meshes
     )
     if not any(material.is_alpha_tested for material in scene.materials):
         return triangles

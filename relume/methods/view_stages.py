@@ -3,7 +3,7 @@
 The bake stores rays, not results: one visibility bit per view sample and light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
-    scene/positions, faces, face_material, face_mesh     triangles, for rays that looks require
+    scene/positions, normals, faces, face_material, face_mesh   triangles, for rays that looks require
     scene/uvs, alpha_masks/…                             of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
     lights/environment                                   radiance, to weight it again
     lights/tiles                                         relume.lights.sphere_tiles.Tiles
@@ -261,6 +261,7 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
 def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[Any]]:
     """Return the merged triangles of a scene, as arrays of a store."""
     arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
+    arrays["scene/normals"] = geometry.normals.astype(np.float16)
     if has_emission_images(scene):
         arrays["scene/face_emission"] = relative_emission(scene)
     alpha_test = geometry.embree.alpha_test

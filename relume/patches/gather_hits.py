@@ -93,9 +93,15 @@ def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
-    """Find the patches hit by the rays of all lanes, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
-    normals, sides, roots = surfaces[0], surfaces[1], tree.roots
+def find_sides(packet, surfaces, roots, keys, nodes):  # type: ignore[no-untyped-def]
+    """Find the side of a mesh that the ray of each lane hits.
+
+    Args:
+        packet: traced rays. surfaces: normal, and index of the front side, of each face. roots: of `PatchTree`.
+        keys: position and normal of each hit, written. (6, `LANES`) float32
+        nodes: root of each side, `NO_PATCH_NODE` for no hit, written. (`LANES`,) int32
+    """
+    normals, sides = surfaces[0], surfaces[1]
     for k in range(LANES):
         nodes[k] = NO_PATCH_NODE
         face, _ = get_hit(packet, k)
@@ -111,7 +117,6 @@ def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untype
         if is_back_face:
             for axis in range(3, 6):
                 keys[axis, k] = -keys[axis, k]
-    locate(tree, keys, nodes)
 
 
 @nb.njit(nogil=True, cache=True)
@@ -131,7 +136,8 @@ def _trace(tracer, points, wo, surfaces, tree, pattern, start, stop, gather_hits
         for ray in range(gather_hits.shape[1]):
             num_rays += _aim(pattern, ray, frame, local_wo, offsets, packet, width)
             trace_hits(packet)
-            _locate_hits(packet, surfaces, tree, keys, patches)
+            find_sides(packet, surfaces, tree.roots, keys, patches)
+            locate(tree, keys, patches)
             for k in range(width):
                 gather_hits[first + k, ray] = patches[k]
     return num_rays

@@ -87,18 +87,18 @@ class PatchLight:
 
     def reflectance_operator(self, reflectances: Reflectances) -> ReflectanceOperator:
         """Return the patches' reflectance operator in a look."""
-        return ReflectanceOperator.from_materials(reflectances, self.material, self._texture_multipliers(reflectances))
+        return ReflectanceOperator.from_materials(reflectances, self.material, self.texture_multipliers(reflectances))
 
     def highlight_tables(
         self, reflectances: Reflectances, reflectance_operator: ReflectanceOperator
     ) -> HighlightTables:
         """Return highlights in a look that are too sharp for the low-degree basis."""
         highlights = HighlightTables.from_materials(
-            reflectances, self.material, self._texture_multipliers(reflectances), reflectance_operator.energy_scale
+            reflectances, self.material, self.texture_multipliers(reflectances), reflectance_operator.energy_scale
         )
         return highlights.subset(np.isin(highlights.rows, reflectance_operator.rows))
 
-    def _texture_multipliers(self, reflectances: Reflectances) -> F32:
+    def texture_multipliers(self, reflectances: Reflectances) -> F32:
         """Return texture multipliers, with the look's material map overrides. (2, C, 3) float32"""
         image_names = [material_reflectance.images for material_reflectance in reflectances]
         if not any(map(any, image_names)):

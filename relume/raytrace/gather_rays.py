@@ -74,10 +74,10 @@ def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> RayPattern:
     """
     if not (num_cosine >= 1 and num_glossy >= 0 and num_cosine + num_glossy <= MAX_RAYS):
         raise PlanError(f"{num_cosine} + {num_glossy} gather rays were requested; give 1 to {MAX_RAYS} in total")
-    uv = np.concatenate([_lattice(num_cosine), _lattice(num_glossy)])
+    uv = np.concatenate([fibonacci_lattice(num_cosine), fibonacci_lattice(num_glossy)])
     u, v = uv.T
     rays = np.stack([u, (1 + 1e3) ** u, np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)], axis=1)
-    sides = np.stack([_shortest_lattice_vectors(num_cosine), _shortest_lattice_vectors(max(1, num_glossy))])
+    sides = np.stack([shortest_lattice_vectors(num_cosine), shortest_lattice_vectors(max(1, num_glossy))])
     return RayPattern(
         uv.astype(np.float32), rays.astype(np.float32), num_cosine, sides.astype(np.float32), seed & 0x7FFFFFFF
     )
@@ -91,13 +91,13 @@ def _step(count: int) -> int:
     return step
 
 
-def _lattice(count: int) -> F64:
+def fibonacci_lattice(count: int) -> F64:
     """Lattice of points on the unit square. (count, 2)"""
     i = np.arange(count)
     return np.stack([(i + 0.5) / max(1, count), i * _step(count) % max(1, count) / max(1, count)], axis=1)
 
 
-def _shortest_lattice_vectors(count: int) -> F64:
+def shortest_lattice_vectors(count: int) -> F64:
     """Two shortest vectors between lattice points, by Lagrange reduction. (2, 2)"""
     shorter, longer = np.array([1.0, _step(count)]) / count, np.array([0.0, 1.0])
     while True:

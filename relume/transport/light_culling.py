@@ -52,7 +52,7 @@ def allocate_list(num_points: int, capacity: int) -> ListedLights:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+def half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Return a bound of the half vector's rotation while wi rotates by `radius`, and cos θd.
 
     The half vector is the middle of an arc of length 2θd with one fixed end. Moving the other end by dε moves the
@@ -91,11 +91,11 @@ def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: igno
             out[k] = acos_clamped(iz[k] * oz - ix[k] * ox - iy[k] * oy) - radius[k]
     elif kind == THETA_D:
         for k in range(ix.shape[0]):
-            _, cos_theta_d = _half_angle_reach(radius[k], ix[k], iy[k], iz[k], ox, oy, oz)
+            _, cos_theta_d = half_angle_reach(radius[k], ix[k], iy[k], iz[k], ox, oy, oz)
             out[k] = acos_clamped(cos_theta_d) - _HALF * radius[k]
     elif kind == THETA_H:
         for k in range(ix.shape[0]):
-            reach, cos_theta_d = _half_angle_reach(radius[k], ix[k], iy[k], iz[k], ox, oy, oz)
+            reach, cos_theta_d = half_angle_reach(radius[k], ix[k], iy[k], iz[k], ox, oy, oz)
             out[k] = acos_clamped(_HALF * (iz[k] + oz) / max(cos_theta_d, np.float32(1e-6))) - reach
     else:
         out[: ix.shape[0]] = 0

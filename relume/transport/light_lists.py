@@ -16,6 +16,7 @@ from relume.lights.light_clusters import visible_fraction, weight_by_visibility
 from relume.lights.spherical_triangles import MergedParts, TriangleLights
 from relume.transport.area_light_kernel import AreaLight, AreaTriangles, allocate_scratch, list_area_light
 from relume.transport.light_culling import CurveSupport, ListedLights, allocate_list, list_lights
+from relume.transport.lobe_rays import find_lobe_rays
 from relume.transport.shading_points import LocalRays, ShadingPoints, is_area_light
 from relume.transport.term_contraction import Contraction
 
@@ -69,6 +70,7 @@ class LightList:
 
     def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: ShadingPoints) -> None:
         self._term, self._lights, self._receivers = term, lights, receivers
+        self._lobe_rays = find_lobe_rays(receivers)
         self.irradiance = lights.irradiance * contraction.constant
         self._support = _curve_support(contraction)
         self._visible_fraction = np.empty(
@@ -98,6 +100,8 @@ class LightList:
         shading = _weighted_quotients(self._term, listed, num)
         if lights.parts is not None:
             weight_by_visibility(listed.first[: len(visible) + 1], listed.light, self._visible_fraction, shading)
+        if self._lobe_rays is not None:
+            self._lobe_rays.share_triangles(lights, r, start, len(visible), listed, shading)
         return shading
 
     def _visible_clusters(self, subset: MergedParts, visible: Bits) -> Bits:

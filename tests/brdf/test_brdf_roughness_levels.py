@@ -48,7 +48,7 @@ def test_parameters_stay_in_their_range() -> None:
         1,
         1,
     ]
-    assert scaled_roughness(document("ggx"), 0.0)["params"]["roughness"] == 0.03
+    assert scaled_roughness(document("ggx"), 0.0)["params"]["roughness"] == 0.01
     assert scaled_roughness(document("phong"), 0.01)["params"]["exponent"] == 1e5
 
 

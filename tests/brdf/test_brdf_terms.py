@@ -319,7 +319,7 @@ def test_description_is_json_for_every_term():
     assert not roughness["requires_new_operator"]
     fixed = {(entry["model"], p["name"]) for entry in listed for p in entry["parameters"] if p["requires_new_operator"]}
     assert ("oren_nayar", "sigma") in fixed
-    assert (roughness["minimum"], roughness["maximum"]) == (0.03, 1.0)
+    assert (roughness["minimum"], roughness["maximum"]) == (0.01, 1.0)
 
 
 def test_outgoing_is_the_view_angle_alone():

@@ -155,7 +155,7 @@ def test_a_metal_has_no_diffuse_part() -> None:
     pbr = {"baseColorFactor": [1, 0.5, 0.25, 1], "metallicFactor": 1, "roughnessFactor": 0}
     lambert, ggx = material_of({"pbrMetallicRoughness": pbr}).terms
     assert lambert["color"] == [0, 0, 0]
-    assert ggx["params"] == {"roughness": 0.03, "f0": [1, 0.5, 0.25]}
+    assert ggx["params"] == {"roughness": 0.01, "f0": [1, 0.5, 0.25]}
 
 
 def test_parameters_stay_in_the_ranges_of_the_terms() -> None:

@@ -56,7 +56,7 @@ GGX = Term(
     model="ggx",
     label="GGX",
     parameters=(
-        Parameter("roughness", "Roughness", 0.03, 1.0, 0.4, "", "linear", "As artists know it; α is its square."),
+        Parameter("roughness", "Roughness", 0.01, 1.0, 0.4, "", "linear", "As artists know it; α is its square."),
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "Seen head-on; 0.04 for plastic and glass."),
     ),
     curves=(

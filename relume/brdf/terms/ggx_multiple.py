@@ -91,7 +91,7 @@ GGX_MULTIPLE = Term(
     model="ggx_multiple",
     label="GGX, between facets",
     parameters=(
-        Parameter("roughness", "Roughness", 0.03, 1.0, 0.4, "", "linear", "The same as that of its GGX."),
+        Parameter("roughness", "Roughness", 0.01, 1.0, 0.4, "", "linear", "The same as that of its GGX."),
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "The same as that of its GGX."),
     ),
     curves=(

@@ -45,6 +45,7 @@ class DisplayedImage:
         reference: the last converged image, if that was in another light; None for a converged image.
         exact_region: the image key (see `LiveTerm.image_key`) and the image region in which it is exact.
         detail: number of refinements of a preview.
+        traces_lobe: whether rays were traced along the lobe if it is narrow.
     """
 
     image: Shaped[F32, "tiles 3 samples"]
@@ -57,6 +58,7 @@ class DisplayedImage:
     reference: DisplayedImage | None = None
     exact_region: tuple[Hashable, Tile] | None = None
     detail: int = 0
+    traces_lobe: bool = True
 
     @property
     def is_empty(self) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import LobeSampling, lobe_curve, sample_lobe
 from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.specular import specular_albedo
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -39,6 +40,7 @@ class LiveTerm:
         target_rows_key: the same as bytes, in order of the curves' names, for keys.
         view_factor: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
         ready: its newest image.
+        levels: roughness levels of its samples.
         displayed: its image in the picture; differs from `ready` until all terms have an image in one light.
         is_composed: the picture's radiance contains `displayed` in its current state.
         mirror: the document whose mirror the picture shows, see `update_mirror`.
@@ -50,10 +52,12 @@ class LiveTerm:
         self.light = light
         self._is_solo = False
         self._before_solo: DisplayedImage | None = None  # reference image for the end of the solo
-        self._cos_theta_o, self._levels = cos_theta_o, levels
+        self._cos_theta_o, self.levels = cos_theta_o, levels
         tiles, samples = tile_layout(len(cos_theta_o))
         self.ready = self.displayed = DisplayedImage(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
+        self._lobe_document: Mapping[str, Any] | None = None
+        self._lobe: LobeSampling | None = None
         self.model: Hashable = None
         self.set_document(document)
         self.displayed, self.mirror = self.ready, self.document
@@ -76,7 +80,7 @@ class LiveTerm:
 
     def set_document(self, document: Mapping[str, Any]) -> None:
         """Set a new target; another model, or another value of a fixed parameter, starts from an empty image."""
-        target = TargetTerm.from_document(document, lambda: self._theta_o, self._levels)
+        target = TargetTerm.from_document(document, lambda: self._theta_o, self.levels)
         if target.model != self.model:
             self.ready, self._before_solo = DisplayedImage(np.zeros_like(self.ready.image)), None
             if not self.displayed.is_empty:  # the target has none of its curves
@@ -87,6 +91,28 @@ class LiveTerm:
         self.target_bands, self.view_factor = target.bands, target.view_factor
         self.target_rows_key = _rows(self.target_bands, ())
         self.is_composed = False
+
+    @property
+    def lobe(self) -> LobeSampling | None:
+        """The lobe along which rays are traced in the newest look; None if it is wide."""
+        if self._lobe_document is not self.document:
+            self._lobe_document, self._lobe = self.document, sample_lobe(self.document, self.levels)
+        return self._lobe
+
+    def lobe_beside(self, basis: EditBasis) -> LobeSampling | None:
+        """Return the lobe along which the light of an operator is traced; None if the basis changes the lobe."""
+        curve = lobe_curve(self.document["model"])
+        return None if curve is None or curve.name in basis.affected_curves else self.lobe
+
+    def mark_untraced(self, image: DisplayedImage) -> DisplayedImage:
+        """Return an operator's image, marked if the operator changes the lobe, which it cannot trace."""
+        basis, curve = image.basis, lobe_curve(self.document["model"])
+        changes_lobe = basis is not None and curve is not None and curve.name in basis.affected_curves
+        return replace(image, traces_lobe=False) if changes_lobe and image.traces_lobe else image
+
+    def _is_untraced(self, image: DisplayedImage) -> bool:
+        """Return whether an image does not trace the narrow lobe of the target."""
+        return not image.traces_lobe and self.lobe is not None
 
     def update_mirror(self) -> None:
         """Update the mirror to the look; a mirror that fades is kept until its lobe can be displayed instead."""
@@ -154,7 +180,8 @@ class LiveTerm:
 
     def is_exact(self) -> bool:
         """Return whether the newest image shows the target exactly."""
-        return self.ready.fidelity == Fidelity.EXACT and not self.changed_curves()
+        ready = self.ready
+        return ready.fidelity == Fidelity.EXACT and not self.changed_curves() and not self._is_untraced(ready)
 
     def has_preview(self) -> bool:
         """Return whether a preview shows the target, so that shading may wait for the end of the drag.
@@ -176,7 +203,8 @@ class LiveTerm:
         """Fidelity of the displayed image with respect to the look."""
         displayed = self.displayed
         is_current = displayed.light == self.light and not displayed.changed_curves(self.target_bands)
-        return displayed.fidelity if is_current else min(displayed.fidelity, Fidelity.APPROXIMATE)
+        limit = Fidelity.NEAR_EXACT if self._is_untraced(displayed) else Fidelity.EXACT
+        return min(displayed.fidelity, limit if is_current else Fidelity.APPROXIMATE)
 
     def operator_key(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
         """Dependencies of an operator besides view and material: model, light, and its fixed curves."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeAlias
 
@@ -11,6 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # a server that only describes its API loads no kernels
+    from relume.brdf.lobe_sampling import LobeSampling
     from relume.core.cache import Cache
     from relume.lights.spherical_triangles import TriangleLights
     from relume.live.fixed_camera.illumination import Illumination, LightSource
@@ -20,6 +21,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.raytrace.surface_points import SurfacePoints
     from relume.scene.model import Camera
     from relume.store.bake_protocol import StoreReader
+    from relume.transport.lobe_hits import LobeHits
     from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
     from relume.views.map_override_store import RayTracer
     from relume.views.view import View
@@ -81,6 +83,14 @@ class Samples(Protocol):
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
         """Return their gather rays, without light; missing ones are traced. None if they have none."""
+        ...
+
+    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
+        """Return the change of normals and view directions in each sample's part of a pixel, or `NO_FOOTPRINT`."""
+        ...
+
+    def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
+        """Return the hits of their lobe rays, cached. key: of the lobe. trace: traces them"""
         ...
 
     def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
@@ -251,6 +261,7 @@ class FixedViewTransfer(OpenBake, Protocol):
         light: Illumination,
         quality: LightQuality = LightQuality.EXACT,
         is_canceled: Callable[[], bool] = lambda: False,
+        lobe: LobeSampling | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at samples; missing rays are traced.
 
@@ -258,6 +269,7 @@ class FixedViewTransfer(OpenBake, Protocol):
             samples: samples of this bake. light: the illumination with its reflectances.
             quality: accuracy of the light.
             is_canceled: polled regularly.
+            lobe: of the one term that is lit, along which rays are traced; None: light from everywhere.
         Raises:
             CancelledError: `is_canceled` returned true.
         """

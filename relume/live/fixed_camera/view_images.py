@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import LobeSampling
 from relume.brdf.roughness_levels import uses_roughness_map
 from relume.brdf.term_validation import complete_term
 from relume.brdf.texture_slots import roughness_image
@@ -185,10 +186,11 @@ class ViewImages:
         light: Illumination,
         is_canceled: Callable[[], bool],
         quality: LightQuality = LightQuality.EXACT,
+        lobe: LobeSampling | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at the samples of a material. See `FixedViewTransfer.incident_light`."""
         samples = self.transfer.samples(self.view, material.index, self.cache)
-        return self.transfer.incident_light(samples, light, quality, is_canceled)
+        return self.transfer.incident_light(samples, light, quality, is_canceled, lobe)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""

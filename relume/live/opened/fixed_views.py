@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 
 from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
+from relume.brdf.albedo import Reflectances
+from relume.brdf.lobe_sampling import LobeSampling
 from relume.core.cache import Cache
+from relume.core.digest import digest
 from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
@@ -25,15 +28,28 @@ from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights,
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.lobe_light import (
+    LobeTracer,
+    choose_peaks,
+    lobe_environment,
+    only_broad,
+    reflects_narrowly,
+    tile_of_texels,
+)
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
+from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
+from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
+from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
+from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
+from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
@@ -213,18 +229,80 @@ class BakedFixedViews:
         light: Illumination,
         quality: LightQuality = LightQuality.EXACT,
         is_canceled: Callable[[], bool] = lambda: False,
+        lobe: LobeSampling | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at samples. See `FixedViewTransfer`."""
-        lights = self.direct_lights(light, quality)
+        lights = self.direct_lights(light, quality if lobe is None else LightQuality.EXACT)
         receivers = samples.receivers(is_lit=lights.num_lights > 0)
-        indirect = self._indirect_rays(samples, light, quality, is_canceled) if light.paths.has_indirect else ()
-        return lights, replace(receivers, rays=(*indirect, *samples.local_rays(light, receivers.points)))
+        rays: list[RayList] = []
+        if lobe is not None:
+            lights = lights.ungrouped()
+            rays.append(self._lobe_rays(samples, receivers, light, lobe, is_canceled))
+        if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
+            gather_rays = self._gather_rays(samples, light, quality, is_canceled)
+            rays.extend(gather_rays if lobe is None else (only_broad(each, receivers, lobe) for each in gather_rays))
+        rays += [*self._mirror_rays(samples, light), *samples.local_rays(light, receivers.points)]
+        return lights, replace(receivers, rays=tuple(rays))
 
-    def _indirect_rays(
+    def _lobe_rays(
+        self,
+        samples: Samples,
+        receivers: ShadingPoints,
+        light: Illumination,
+        lobe: LobeSampling,
+        is_canceled: Callable[[], bool],
+    ) -> LobeRays:
+        """Return the rays along a lobe, which carry light of patches and of the environment."""
+        pattern = self._lobe_tracer.pattern(lobe)
+        reflectances = light.reflectances if light.paths.has_all_bounces else ()
+        narrow = tuple(reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances)
+        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
+        tint, share = self._lobe_patches(reflectances)
+        footprint = samples.pixel_footprint(receivers)
+        surfaces = self._lobe_tracer.surfaces(reflectances if any(narrow) else (), tint)
+        trace_args = receivers, footprint, pattern, surfaces, is_canceled
+        hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(*trace_args))
+        environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
+        light_args = self._patch_light(light, is_canceled), environment, share
+        return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks)
+
+    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
+        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
+        return np.ones((NO_PATCH + 1, 3), np.float32), np.ones(NO_PATCH + 1, np.float32)
+
+    def _lobe_environment(self, light: Illumination) -> tuple[LobeEnvironment, LobePeaks]:
+        key, rotation = light.environment, light.environment.rotation
+        radiance, lights = self.environment_map(key.map), self.environment_lights(key, LightQuality.EXACT)
+        tile = self.cache.get_value(
+            (self.key, "tile of texels", key), lambda: tile_of_texels(self.tiles, radiance.shape[:2], rotation)
+        )
+        gain = np.array(light.environment_gain, np.float32)
+        weighted = radiance if np.all(gain == 1) else radiance * gain
+        peaks, irradiance, without_peaks = choose_peaks(weighted, tile, lights)
+        environment = lobe_environment(weighted, tile, rotation, lights, without_peaks, is_direct=light.paths.direct)
+        return environment, LobePeaks(lights.direction[peaks], irradiance, self._patch_visibility(peaks))
+
+    def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
+        """Return the fraction of each patch's points that see some light triangles: there are no patches."""
+        return np.zeros((NO_PATCH + 1, len(lights)), np.float32)
+
+    def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
+        """Return the outgoing light of patches: there are none."""
+        return no_light()
+
+    def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
-    ) -> tuple[RayList, ...]:
+    ) -> tuple[GatherRays, ...]:
         """Return the rays that carry indirect illumination to samples: none was baked."""
         return ()
+
+    def _mirror_rays(self, samples: Samples, light: Illumination) -> tuple[RayList, ...]:
+        """Return the rays from virtual lights in planar mirrors: none was baked."""
+        return ()
+
+    @cached_property
+    def _lobe_tracer(self) -> LobeTracer:
+        return LobeTracer(self.store, self.tracer)
 
     def downsampled(self, view_name: str, step: int) -> Self:
         """Return one view with 1 / step² of its pixels. Its images are not saved: its key is no folder."""
@@ -300,6 +378,19 @@ class MaterialSamples:
         """The virtual lights that the samples see in planar mirrors."""
         return self.view.mirror_lights(self.material)
 
+    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
+        """Return the change of normals and view directions in pixels. See `Samples`."""
+        view = self.view
+
+        def compute() -> F32:
+            return pixel_footprint(view.pixel[view.rows(self.material)], view.width, receivers.points, receivers.wo)
+
+        return self.cache.transient.get_value((*self.key, "pixel footprint"), compute)
+
+    def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
+        """Return the hits of lobe rays, cached until the memory is needed."""
+        return self.cache.transient.get_value((*self.key, "lobe hits", key), trace)
+
     def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
         """Return the rays of local lights, with cached shadows. points: the samples"""
 
@@ -342,6 +433,14 @@ class SelectedSamples:
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
         """Return the gather rays, without light."""
         return self.stored_rays
+
+    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
+        """Return no change within a pixel: the points are not neighbors."""
+        return NO_FOOTPRINT
+
+    def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
+        """Return the hits of lobe rays."""
+        return trace()
 
     def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
         """Return the rays of local lights; shadows are traced."""

@@ -11,12 +11,15 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.albedo import Reflectances
+from relume.brdf.texture_slots import TEXTURES
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
 from relume.live.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples, read_fields
 from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.lobe_light import broad_share
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.live.opened.planar_mirror_light import MirrorLightTransfer
@@ -26,8 +29,11 @@ from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.store.bake_protocol import StoreReader
-from relume.transport.shading_points import RayList
+from relume.transport.outgoing_patch_light import OutgoingLight, no_light
+from relume.transport.shading_points import GatherRays, RayList
 from relume.views.view import View
+
+F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -109,18 +115,40 @@ class BakedIndirectViews(BakedFixedViews):
         gather_rays = view.subset_rays(material, sample_indices)
         return replace(samples, stored_rays=gather_rays, mirror_visibility=mirror_visibility)
 
-    def _indirect_rays(
+    def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
+        """Return the exact outgoing light of patches."""
+        return self.indirect.outgoing_light(light, is_canceled) if light.paths.has_indirect else no_light()
+
+    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
+        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
+        tint, share = super()._lobe_patches(reflectances)
+        if reflectances:
+            material, num = self.patches.material, self.patches.num_patches
+            tint[:num] = self.patches.texture_multipliers(reflectances)[TEXTURES.index("specular")]
+            share[:num] = np.array([broad_share(reflectance) for reflectance in reflectances], np.float32)[material]
+        return tint, share
+
+    def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
+        """Return the fraction of each patch's points that see some light triangles."""
+        out, bits = super()._patch_visibility(lights), self.patches.visible[:, :, lights >> 3] >> (lights & 7) & 1
+        out[: len(bits)] = bits.mean(axis=1)
+        return out
+
+    def _gather_rays(
         self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
-    ) -> tuple[RayList, ...]:
-        """Return the rays from patches, and those from virtual lights in planar mirrors."""
+    ) -> tuple[GatherRays, ...]:
+        """Return the rays from patches."""
         gather_rays = samples.gather_rays(is_canceled)
         if gather_rays is None:
             return ()
         # in a preview, tracing overridden normals takes too long
         reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
-        rays = replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled))
+        return (replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled)),)
+
+    def _mirror_rays(self, samples: Samples, light: Illumination) -> tuple[RayList, ...]:
+        """Return the rays from virtual lights in planar mirrors."""
         mirror_light = self.mirror_light
-        if mirror_light is None or not mirror_light.is_in(light):
-            return (rays,)
-        assert samples.mirror_visibility is not None  # stored with the gather rays
-        return rays, mirror_light.virtual_lights(light).rays(samples.mirror_visibility)
+        if mirror_light is None or not light.paths.has_indirect or not mirror_light.is_in(light):
+            return ()
+        visible = samples.mirror_visibility
+        return () if visible is None else (mirror_light.virtual_lights(light).rays(visible),)

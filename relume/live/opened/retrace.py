@@ -40,7 +40,7 @@ class NormalRetracer:
     def check(self) -> None:
         """Raise StoreError if the store lacks data for tracing its rays."""
         if "gather_rays" in self._store.attributes:
-            _ = self._geometry
+            _ = self.geometry
 
     def visibility(
         self, points: SurfacePoints, baked_normals: Shaped[F32, "n 3"], baked_bits: Shaped[NDArray[np.uint8], "n bytes"]
@@ -68,13 +68,13 @@ class NormalRetracer:
         Args:
             points: with the new normals. wo: view directions. pattern: pattern of the rays.
         """
-        return trace_gather_rays(self._geometry, self._tree, points, wo, pattern).patch
+        return trace_gather_rays(self.geometry, self._tree, points, wo, pattern).patch
 
     def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
         """Trace the lights that points see in planar mirrors. points: with the new normals"""
         assert self._mirror_lights is not None  # callers have read them from the store
         return lights_visible_in_mirrors(
-            self._geometry, self._mirror_lights.mirrors, points, self._mirror_lights.direction
+            self.geometry, self._mirror_lights.mirrors, points, self._mirror_lights.direction
         ).visible
 
     @cached_property
@@ -82,7 +82,7 @@ class NormalRetracer:
         return read_tree(self._store)
 
     @cached_property
-    def _geometry(self) -> SceneBuffers:
+    def geometry(self) -> SceneBuffers:
         """Triangles for rays between surfaces: without normals and textures."""
         store, positions, faces = self._store, self._local.positions, self._local.faces
         try:

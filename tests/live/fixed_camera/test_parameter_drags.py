@@ -51,7 +51,7 @@ def prepare(picture, pointer):
 def test_a_slider_of_several_curves_is_followed_at_once(transfer, picture):
     prepare(picture, ROUGHNESS)
     assert picture.next_job() is None
-    for roughness in (0.41, 0.1, 0.9, 0.33):
+    for roughness in (0.41, 0.25, 0.9, 0.33):
         picture.set_look(make_look(transfer, shiny(roughness)))
         need = picture.next_job()
         assert need is None
@@ -89,6 +89,30 @@ def test_shading_of_an_outdated_look_is_not_shown(transfer, picture):
     make(picture, old)
     assert not picture.advance(None).exact
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.7))) < MAX_ERROR
+
+
+def test_a_narrow_lobe_is_exact_again_when_the_slider_stops(transfer, picture):
+    """Its operator does not trace the lobe, so that the picture is nearly exact at most, and off by some percent."""
+    prepare(picture, ROUGHNESS)
+    for roughness in (0.1, 0.05):
+        picture.set_look(make_look(transfer, shiny(roughness)))
+        advance = picture.advance(8)
+        assert advance.changed
+        assert not advance.exact
+        assert relative_rmse(picture.image(), exact(transfer, shiny(roughness))) < 0.05
+    assert relative_rmse(run_until_exact(picture).image(), exact(transfer, shiny(0.05))) < 1e-6
+
+
+def test_a_drawn_narrow_lobe_is_not_exact_until_it_is_traced(transfer, picture):
+    picture.set_look(make_look(transfer, shiny(0.1)))
+    run_until_exact(picture)
+    picture.prepare(THETA_H)
+    run_until_exact(picture)
+    picture.set_look(make_look(transfer, shiny(0.08)))
+    advance = picture.advance(None)
+    assert advance.changed
+    assert not advance.exact
+    assert relative_rmse(run_until_exact(picture).image(), exact(transfer, shiny(0.08))) < 1e-6
 
 
 @pytest.mark.parametrize("hand", [None, THETA_H, "/lights/Lamp"])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import LobeSampling
 from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -29,6 +30,7 @@ class OperatorPrecompute:
 
     Attributes:
         basis: the free coefficients. key: of the operator in the cache. bands: of the term's curves, (3, J) each.
+        lobe: along which rays are traced; None if it is wide, or changed by the basis.
         light: the illumination. form: compression of the operator.
     """
 
@@ -37,6 +39,7 @@ class OperatorPrecompute:
     key: tuple[Hashable, ...]
     term: Term
     bands: Mapping[str, F64]
+    lobe: LobeSampling | None
     light: Illumination
     form: Compression
 
@@ -49,7 +52,8 @@ class OperatorPrecompute:
         """
         images, material, live = target
         key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.has_merged_lights)
-        return cls(target, basis, key, live.term, live.target_bands, live.light, form)
+        term_args = live.term, live.target_bands, live.lobe_beside(basis)
+        return cls(target, basis, key, *term_args, live.light, form)
 
     def job(self) -> Job:
         """Return the job; it can wait if the term already has a preview."""
@@ -69,7 +73,7 @@ class OperatorPrecompute:
         quality = LightQuality.MERGED if has_merged_lights else LightQuality.EXACT
 
         def build_operator() -> LinearOperator:
-            lights, receivers = images.incident_light(material, self.light, is_canceled, quality)
+            lights, receivers = images.incident_light(material, self.light, is_canceled, quality, self.lobe)
 
             def precompute_at(samples: ShadingPoints) -> LinearOperator:
                 return precompute(self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits)
@@ -106,7 +110,8 @@ class OperatorPrecompute:
             return
         improves_fidelity = ready.fidelity < Fidelity.EXACT and self.basis.is_complete
         if not changed <= set(self.basis.affected_curves) or (changed and not has_coefficients) or improves_fidelity:
-            live.set_ready(ready.evaluate_operator(result, self.basis, live.target_bands, live.light))
+            after = ready.evaluate_operator(result, self.basis, live.target_bands, live.light)
+            live.set_ready(live.mark_untraced(after))
         elif not has_coefficients:
             live.set_ready(replace(ready, basis=self.basis, coefficients=self.basis.coefficients(live.target_bands)))
 

@@ -116,7 +116,7 @@ def _refinement_job(situation: Situation) -> Job | None:
     """Return a job that shades a nearly exact image."""
     for target in situation.targets:
         live = target.live
-        if live.is_converged and not live.changed_curves() and live.ready.fidelity < Fidelity.EXACT:
+        if live.is_converged and not live.changed_curves() and not live.is_exact():
             return Shading.for_target(target, situation.images.light).job(Priority.REFINEMENT)
     return None
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import LobeSampling
 from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage, weighted_sum
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -40,7 +41,7 @@ class Shading:
 
     Attributes:
         key: of the image in the cache. model: of the term. bands: of its curves, (3, J) each.
-        light_components: their sum is the light.
+        lobe: along which rays are traced; None if it is wide.
         is_default: the look is the scene's own, whose images are cached next to the store.
     """
 
@@ -49,8 +50,8 @@ class Shading:
     term: Term
     model: Hashable
     bands: Mapping[str, F64]
+    lobe: LobeSampling | None
     light: Illumination
-    light_components: Sequence[LightComponent]
     is_default: bool
 
     @classmethod
@@ -58,12 +59,9 @@ class Shading:
         """Return the shading of a target in some light."""
         images, material, live = target
         key = images.image_key(material, live, light)
-        components = [
-            LightComponent(images.image_key(material, live, component), component, gain)
-            for component, gain in split_for_shading(light).items()
-        ]
         is_default = images.is_default(material, live, light)
-        return cls(target, key, live.term, live.model, live.target_bands, light, components, is_default)
+        term_args = live.term, live.model, live.target_bands, live.lobe
+        return cls(target, key, *term_args, light, is_default)
 
     def job(self, priority: Priority | None = None) -> Job:
         """Return the job of the complete image. priority: None: it can wait if the term already has a preview."""
@@ -75,6 +73,17 @@ class Shading:
     def label(self) -> str:
         """Text for the user."""
         return f"{self.target.name}, {self.term.label}"
+
+    @cached_property
+    def light_components(self) -> Sequence[LightComponent]:
+        """Components whose sum is the light. Lobe rays bring all light at once."""
+        if self.lobe is not None:
+            return []
+        images, material, live = self.target
+        return [
+            LightComponent(images.image_key(material, live, component), component, gain)
+            for component, gain in split_for_shading(self.light).items()
+        ]
 
     @property
     def num_bytes(self) -> int:
@@ -134,7 +143,7 @@ class Shading:
         partial_image.shade(
             self.term,
             self.bands,
-            *images.incident_light(material, light, is_canceled),
+            *images.incident_light(material, light, is_canceled, lobe=self.lobe),
             progress,
             is_canceled,
             sample_mask,

@@ -1,0 +1,242 @@
+"""Light of an open bake along lobe rays, traced when the lobe is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.assets.environments.equirect import (
+    halve_to_width,
+    rotate_about_y,
+    texel_directions,
+    texel_solid_angles,
+)
+from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
+from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
+from relume.brdf.roughness_levels import NO_LEVELS
+from relume.core.errors import StoreError
+from relume.lights.sphere_tiles import Tiles
+from relume.lights.spherical_triangles import TriangleLights
+from relume.live.opened.retrace import NormalRetracer
+from relume.methods.patch_layout import read_tree
+from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
+from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
+from relume.store.bake_protocol import StoreReader
+from relume.transport.lobe_hits import LobeHits, LobeSurfaces, PatchLookup, patch_reach, trace_lobe_rays
+from relume.transport.lobe_rays import LobeEnvironment
+from relume.transport.shading_points import GatherRays, ShadingPoints
+
+F32 = NDArray[np.float32]
+
+_ALBEDO_STEPS = 64
+_PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
+_MAX_LOBES = 255
+_WIDE = np.radians(1.0)  # median of a lobe in which suns are no texels
+_BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
+_NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
+
+
+class LobeTracer:
+    """Traces lobe rays from samples of a bake.
+
+    Args:
+        store: the bake's. tracer: with the triangles of the scene.
+    """
+
+    def __init__(self, store: StoreReader, tracer: NormalRetracer) -> None:
+        self._store, self._tracer = store, tracer
+
+    def pattern(self, lobe: LobeSampling) -> LobePattern:
+        """Return the rays of every sample: fewer for a narrow lobe."""
+        num_rays = _NARROW_RAYS if lobe.median.max() < _WIDE else _LOBE_RAYS
+        return make_lobe_pattern(lobe, num_rays, int(self._store.attributes.get("gather_seed", 0)))
+
+    def trace(
+        self,
+        receivers: ShadingPoints,
+        footprint: Shaped[F32, "#n 2 2 3"],
+        pattern: LobePattern,
+        surfaces: LobeSurfaces,
+        is_canceled: Callable[[], bool],
+    ) -> LobeHits:
+        """Trace the rays of points. See `trace_lobe_rays`.
+
+        Args:
+            receivers: the points. footprint: of each in its pixel. pattern: their rays.
+            surfaces: that rays go on from. is_canceled: polled.
+        """
+        points_args = receivers.points, receivers.wo, footprint, receivers.level
+        return trace_lobe_rays(self._tracer.geometry, self._lookup, surfaces, *points_args, pattern, is_canceled)
+
+    def surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"]) -> LobeSurfaces:
+        """Return the surfaces that rays go on from: those with narrow lobes.
+
+        Args:
+            reflectances: of all materials. Empty: rays end at the first surface.
+            tint: mean of the specular texture of each patch.
+        """
+        geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
+        found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
+        row = np.full(len(geometry.face_material) and int(geometry.face_material.max()) + 1, -1, np.int32)
+        for k, index in enumerate([index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]):
+            row[index] = k
+        quantile, band_density = (
+            _padded([lobe.quantile[0] for lobe, _ in found]),
+            _padded([lobe.band_density[0] for lobe, _ in found]),
+        )
+        num_bands = np.array([lobe.band_density.shape[1] for lobe, _ in found], np.float32)
+        median = np.array([lobe.median[0] for lobe, _ in found], np.float32)
+        return LobeSurfaces(
+            faces=geometry.faces,
+            face_material=geometry.face_material,
+            normals=self._normals,
+            lobe=row,
+            quantile=quantile,
+            band_density=band_density,
+            is_half_angle=np.array([lobe.is_half_angle for lobe, _ in found], np.bool_),
+            scale=np.asarray(num_bands / (np.pi / 2), np.float32),
+            albedo=np.array([_albedo_by_cosine(documents) for _, documents in found], np.float32).reshape(
+                -1, _ALBEDO_STEPS, 3
+            ),
+            blur=np.asarray(np.where(median > _WIDE, _BLUR * median, 0), np.float32),
+            tint=tint,
+            offset=geometry.epsilon,
+        )
+
+    @cached_property
+    def _normals(self) -> F32:
+        """Normals of the corners; empty for a store that lacks them."""
+        try:
+            return np.asarray(self._store.read("scene/normals"), np.float32)
+        except StoreError:
+            return np.empty((0, 3), np.float32)
+
+    @cached_property
+    def _lookup(self) -> PatchLookup:
+        geometry = self._tracer.geometry
+        sides = (2 * geometry.face_mesh).astype(np.int32)
+        try:
+            tree, reach = read_tree(self._store), patch_reach(self._store.read("patches/position"))
+        except StoreError:  # direct light alone
+            tree, reach = _no_patches(int(sides.max(initial=0)) + 2), patch_reach(np.empty((0, 1, 3), np.float32))
+        return PatchLookup(tree, geometry.face_normals, sides, reach)
+
+
+def _padded(rows: Sequence[F32]) -> F32:
+    """Stack rows of different lengths, padded with their last value."""
+    width = max(map(len, rows), default=0)
+    padded = [np.pad(row, (0, width - len(row)), mode="edge") for row in rows]
+    return np.array(padded, np.float32).reshape(len(rows), width)
+
+
+def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "steps 3"]:
+    """Return the directional albedo of terms at equal steps of cos θo."""
+    theta_o, values = directional_albedo(documents)
+    cosine = np.linspace(0, 1, _ALBEDO_STEPS)
+    return np.stack([np.interp(cosine, np.cos(theta_o)[::-1], column[::-1]) for column in values.T], axis=1)
+
+
+def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
+    """Return the lobe of a material whose highlights are narrow and strong, and their terms; None for others."""
+    lobes = (sample_lobe(document, NO_LEVELS) for document in reflectance.lobes)
+    narrow = next((lobe for lobe in lobes if lobe is not None), None)
+    return None if narrow is None else (narrow, reflectance.lobes)
+
+
+def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
+    """Remove the gather rays of points whose light is traced along their lobe."""
+    is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
+    gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
+    return replace(rays, gather_hits=gather_hits)
+
+
+def reflects_narrowly(reflectance: Reflectance) -> bool:
+    """True if lobe rays go on from a material."""
+    return _narrow_lobe(reflectance) is not None
+
+
+def broad_share(reflectance: Reflectance) -> float:
+    """Share of a material's reflectance that its narrow highlights do not have."""
+    if not reflects_narrowly(reflectance):
+        return 1.0
+    total = float(reflectance.matrix[:, :, 0].sum())
+    narrow = sum(float(quantized_reflectance(document)[:, 0].sum()) for document in reflectance.lobes)
+    return max(0.0, 1 - narrow / max(total, 1e-6))
+
+
+def _no_patches(num_sides: int) -> PatchTree:
+    """Return the tree of a scene without patches."""
+    return PatchTree(
+        np.zeros(1, np.uint8),
+        np.zeros(1, np.float32),
+        np.full((1, 2), NO_PATCH_NODE, np.int32),
+        np.full(num_sides, NO_PATCH_NODE, np.int32),
+    )
+
+
+def tile_of_texels(tiles: Tiles, shape: tuple[int, int], rotation: float) -> Shaped[NDArray[np.int32], "height width"]:
+    """Return the light triangle of each texel of an environment.
+
+    Args:
+        tiles: of the bake. shape: height and width of the map. rotation: of the map about +Y, degrees.
+    """
+    directions = rotate_about_y(texel_directions(*shape).reshape(-1, 3).astype(np.float64), rotation)
+    return tiles.locate(directions).reshape(shape)
+
+
+def _halved(radiance: F32) -> list[F32]:
+    """Return a map and its halves down to one row."""
+    images = [radiance]
+    while min(images[-1].shape[:2]) > 1 and images[-1].shape[0] % 2 == images[-1].shape[1] % 2 == 0:
+        images.append(halve_to_width(images[-1], images[-1].shape[1] // 2))
+    return images
+
+
+def choose_peaks(
+    radiance: Shaped[F32, "height width 3"], tile: Shaped[NDArray[np.int32], "height width"], lights: TriangleLights
+) -> tuple[NDArray[np.intp], Shaped[F32, "K 3"], Shaped[F32, "height width 3"]]:
+    """Choose the brightest triangles of an environment: hardly any ray of two wide lobes meets them.
+
+    Returns:
+        The triangles; the irradiance of their light above a limit, on surfaces perpendicular to it; the map without it.
+    """
+    limited = np.minimum(radiance, _PEAK * radiance.mean(axis=(0, 1)))
+    excess = (radiance - limited) * texel_solid_angles(*radiance.shape[:2])[:, None, None]
+    num, flat = lights.num_lights, tile.ravel()
+    irradiance = np.stack([np.bincount(flat, channel.ravel(), num) for channel in np.moveaxis(excess, 2, 0)], axis=1)
+    peaks = np.argsort(-irradiance.sum(axis=1), kind="stable")[:_MAX_PEAKS]
+    peaks = peaks[irradiance[peaks].sum(axis=1) > 0]
+    is_peak = np.zeros(num, np.bool_)
+    is_peak[peaks] = True
+    return peaks, irradiance[peaks].astype(np.float32), np.where(is_peak[tile][..., None], limited, radiance)
+
+
+def lobe_environment(
+    radiance: Shaped[F32, "height width 3"],
+    tile: Shaped[NDArray[np.int32], "height width"],
+    rotation: float,
+    lights: TriangleLights,
+    without_peaks: Shaped[F32, "height width 3"],
+    *,
+    is_direct: bool,
+) -> LobeEnvironment:
+    """Return an environment for lobe rays. See `LobeEnvironment`.
+
+    Args:
+        radiance: the map, times its gain. tile: from `tile_of_texels`. rotation: degrees. lights: its triangles.
+        without_peaks: from `choose_peaks`. is_direct: as in `LobeEnvironment`.
+    """
+    cosine_sine = np.array([np.cos(np.radians(rotation)), np.sin(np.radians(rotation))], np.float32)
+    images = _halved(np.ascontiguousarray(without_peaks, np.float32))
+    shapes = np.array([image.shape[:2] for image in images])
+    sizes = shapes.prod(axis=1)
+    levels = np.column_stack([np.cumsum(sizes) - sizes, shapes])
+    texels = np.concatenate([image.reshape(-1, 3) for image in images])
+    light_args = lights.direction, lights.radius, lights.solid_angle
+    arrays = np.ascontiguousarray(radiance, np.float32), tile, cosine_sine
+    return LobeEnvironment(*arrays, *light_args, texels, levels.astype(np.int64), is_direct)

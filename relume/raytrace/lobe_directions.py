@@ -1,0 +1,155 @@
+"""Directions of lobe rays, drawn from the lobe of a term; recomputed wherever they are needed, never stored.
+
+Rays are a Fibonacci lattice on the unit square (u, v): u is the quantile of the angle, v the azimuth. Points share the
+lattice, each shifted within a cell by its seed, as gather rays (`relume.raytrace.gather_rays`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.brdf.lobe_sampling import LobeSampling
+from relume.raytrace.gather_rays import cranley_patterson_offset, fibonacci_lattice, shortest_lattice_vectors
+
+F32 = NDArray[np.float32]
+
+_PI = np.float32(math.pi)
+_ZERO, _HALF, _ONE, _TWO, _FOUR = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2), np.float32(4)
+_MARGIN = np.float32(0.01)  # of a band, which rounding must not make a ray cross
+_MIN_COSINE = np.float32(1e-4)
+# Roberts' R2 sequence, as fractions of 2^32
+_STEP_U, _STEP_V = (np.uint32(round(2**32 / 1.32471795724474602596**k)) for k in (1, 2))
+_PER_UNIT = np.float32(1 / (1 << 24))
+
+
+class LobePattern(NamedTuple):
+    """Lobe rays of every point, before their shift.
+
+    Attributes:
+        uv: points on the unit square.
+        sides: two edge vectors of a lattice cell.
+        seed: seed of the shifts.
+        quantile, band_density, is_half_angle, is_narrow: as in `LobeSampling`; points of other levels have no rays.
+        scale: bands per radian.
+    """
+
+    uv: Shaped[F32, "N 2"]
+    sides: Shaped[F32, "2 2"]
+    seed: int
+    quantile: Shaped[F32, "L quantiles"]
+    band_density: Shaped[F32, "L J"]
+    is_half_angle: bool
+    is_narrow: Shaped[NDArray[np.bool_], " L"]
+    scale: float
+
+    @property
+    def num_rays(self) -> int:
+        """Number of rays N of a point."""
+        return len(self.uv)
+
+
+def make_lobe_pattern(sampling: LobeSampling, num_rays: int, seed: int) -> LobePattern:
+    """Distribute rays over a lobe. seed: only the lowest 31 bits count."""
+    return LobePattern(
+        fibonacci_lattice(num_rays).astype(np.float32),
+        shortest_lattice_vectors(num_rays).astype(np.float32),
+        seed & 0x7FFFFFFF,
+        sampling.quantile,
+        sampling.band_density,
+        sampling.is_half_angle,
+        sampling.is_narrow,
+        np.float32(sampling.band_density.shape[1] / (np.pi / 2)),  # type: ignore[arg-type]  # a kernel's float32
+    )
+
+
+# The following functions are inlined: calls would count references to the pattern's arrays, which threads share.
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_shift(pattern, seed):  # type: ignore[no-untyped-def]
+    """Shift of a point's rays on the unit square, within a cell of the lattice. (2,) as a tuple"""
+    s, t = cranley_patterson_offset(pattern, seed)
+    s, t = s - _HALF, t - _HALF
+    return (
+        s * pattern.sides[0, 0] + t * pattern.sides[1, 0],
+        s * pattern.sides[0, 1] + t * pattern.sides[1, 1],
+    )
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_ray(pattern, level, ray, shift, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Direction of a ray in the point's local frame, x = tangent, y = n × t, z = n.
+
+    Args:
+        pattern: a `LobePattern`. level: roughness level of the point. ray: index of the ray.
+        shift: from `lobe_shift`. ox, oy, oz: local wo, toward the viewer.
+    Returns:
+        Local wi, not above the horizon for rays that must not be traced; band of the ray's angle.
+    """
+    u, v = pattern.uv[ray, 0] + shift[0], pattern.uv[ray, 1] + shift[1]
+    u = u - _ONE if u >= _ONE else (u + _ONE if u < _ZERO else u)
+    scaled = pattern.scale * angle_at_quantile(pattern.quantile, level, u)
+    band = min(int(scaled), pattern.band_density.shape[1] - 1)
+    within = min(max(scaled - np.float32(band), _ZERO if band == 0 else _MARGIN), _ONE - _MARGIN)
+    wi, is_valid = lobe_direction(pattern.is_half_angle, (np.float32(band) + within) / pattern.scale, v, ox, oy, oz)
+    return wi, band if is_valid else -1
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def angle_at_quantile(quantile, row, u):  # type: ignore[no-untyped-def]
+    """Angle at the fraction u of a cumulative distribution, `LobeSampling.quantile` [row], radians."""
+    num_cells = quantile.shape[1] - 1
+    position = u * np.float32(num_cells)
+    cell = min(int(position), num_cells - 1)
+    low, high = quantile[row, cell], quantile[row, cell + 1]
+    return low + (position - np.float32(cell)) * (high - low)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_direction(is_half_angle, angle, v, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Local wi at an angle of a lobe.
+
+    Args:
+        is_half_angle: whether the angle is θh, else θr. angle: radians. v: azimuth as a fraction of a turn.
+        ox, oy, oz: local wo.
+    Returns:
+        wi, a tuple; False if it belongs to no half vector that the viewer sees.
+    """
+    azimuth = _TWO * _PI * v
+    sine, z = np.float32(math.sin(angle)), np.float32(math.cos(angle))
+    x, y = sine * np.float32(math.cos(azimuth)), sine * np.float32(math.sin(azimuth))
+    if is_half_angle:
+        twice_cosine = _TWO * (ox * x + oy * y + oz * z)
+        return (twice_cosine * x - ox, twice_cosine * y - oy, twice_cosine * z - oz), twice_cosine > _ZERO
+    # about the mirror direction (−ox, −oy, oz): the frame that rotates n to it along the shortest arc
+    inverse = _ONE / max(_ONE + oz, _MIN_COSINE)
+    along = x * ox + y * oy
+    return (
+        x - ox * along * inverse - ox * z,
+        y - oy * along * inverse - oy * z,
+        along + oz * z,
+    ), True
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def ray_jitter(ray, seed):  # type: ignore[no-untyped-def]
+    """Two numbers in [0, 1) of a ray, spread evenly over the rays of a point. ray: its index. seed: of the point"""
+    start = np.uint32(seed) * np.uint32(0x9E3779B9)
+    u = np.uint32(start + np.uint32(ray) * _STEP_U)
+    v = np.uint32((start ^ np.uint32(0x68E31DA4)) * np.uint32(0x85EBCA6B) + np.uint32(ray) * _STEP_V)
+    return np.float32(u >> np.uint32(8)) * _PER_UNIT, np.float32(v >> np.uint32(8)) * _PER_UNIT
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_density(pattern, level, band, cos_theta_d):  # type: ignore[no-untyped-def]
+    """Mean density of all N rays of a point in a band, per steradian of wi.
+
+    Args:
+        pattern: a `LobePattern`. level: roughness level. band: of the angle. cos_theta_d: cosine wi · h.
+    """
+    density = np.float32(pattern.uv.shape[0]) * pattern.band_density[level, band]
+    return density / (_FOUR * max(cos_theta_d, _MIN_COSINE)) if pattern.is_half_angle else density

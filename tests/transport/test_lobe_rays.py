@@ -1,0 +1,166 @@
+"""Lobe rays: unbiased at any width, together with the triangles that they share light with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+
+from relume.assets.environments.equirect import lookup, rotate_about_y
+from relume.brdf.curves import curve_bands, curve_values
+from relume.brdf.lobe_sampling import sample_lobe
+from relume.brdf.registry import TERMS
+from relume.brdf.roughness_levels import NO_LEVELS
+from relume.brdf.term_validation import complete_term
+from relume.lights.sphere_tiles import choose_tiles
+from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
+from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
+from relume.raytrace.lobe_directions import make_lobe_pattern
+from relume.raytrace.tangents import any_tangent
+from relume.transport.lobe_hits import NO_FOOTPRINT, NO_SURFACES, LobeHits, no_paths
+from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeRays
+from relume.transport.outgoing_patch_light import isotropic, no_light
+from relume.transport.shading.shader import Shader
+from relume.transport.shading_points import build_ray_lists
+from relume.transport.term_contraction import contract
+
+NUM_POINTS = 64
+NO_HIT = 65_535
+NO_SHARE = np.ones(65_536, np.float32)
+
+
+def document(model, **params):
+    return complete_term(("terms", 0), {"model": model, "params": params}, None)
+
+
+def view(degrees):
+    """The same point many times, seen from one direction; seeds differ. Normals and wo, (n, 3)"""
+    angle = np.radians(degrees)
+    normal = np.tile(np.float32([0.36, 0.48, 0.8]), (NUM_POINTS, 1))
+    wo = np.cos(angle) * normal + np.sin(angle) * any_tangent(normal)
+    return normal, wo.astype(np.float32)
+
+
+def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotation=0.0, num_rays=144):
+    """Points without occluders, with lobe rays and triangles of an environment."""
+    tiles = choose_tiles(radiance, num_lights)
+    lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance), rotation).ungrouped()
+    pattern = make_lobe_pattern(sample_lobe(term_document, NO_LEVELS), num_rays, 3)
+    hits = LobeHits(
+        np.full((len(normal), num_rays), NO_HIT, np.uint16),
+        np.full((len(normal), -(-num_rays // 8)), 255, np.uint8),
+        no_paths(len(normal)),
+    )
+    tile = tile_of_texels(tiles, radiance.shape[:2], rotation)
+    environment = lobe_environment(radiance, tile, rotation, lights, radiance, is_direct=True)
+    rays = LobeRays(hits, pattern, no_light(), environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+    visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
+    points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), visible)
+    return lights, ref.only_above(replace(points, rays=(rays,)), lights)
+
+
+def shade(term_document, lights, receivers):
+    term = TERMS[term_document["model"]]
+    bands = {c.name: curve_bands(term_document, c) for c in term.curves if not c.depends_on_view}
+    shader = Shader(term, contract(term, bands, None), lights, receivers)
+    return shader.project(0, len(receivers.normal))[:, 0].astype(float)
+
+
+def brute_force(term_document, normal, wo, radiance_along):
+    """∫ f L cos θi dω by half vectors on a fine grid about the lobe, exact curves; without curves of wo. (3,)"""
+    term = TERMS[term_document["model"]]
+    n, o = normal[0].astype(float), wo[0].astype(float)
+    t = any_tangent(normal[:1])[0].astype(float)
+    frame = np.stack([t, np.cross(n, t), n])
+    local_o = frame @ o
+    theta = np.sinh(np.linspace(0, np.arcsinh(np.pi / 2 / 1e-5), 6001)) * 1e-5
+    middle, width = 0.5 * (theta[1:] + theta[:-1]), np.diff(theta)
+    phi = (np.arange(720) + 0.5) * (2 * np.pi / 720)
+    h = np.stack(np.broadcast_arrays(
+        np.sin(middle)[:, None] * np.cos(phi), np.sin(middle)[:, None] * np.sin(phi), np.cos(middle)[:, None]
+    ), -1)  # fmt: skip
+    cos_d = h @ local_o
+    i = 2 * cos_d[..., None] * h - local_o
+    weight = (np.sin(middle) * width)[:, None] * (2 * np.pi / 720) * 4 * np.maximum(cos_d, 0) * np.maximum(i[..., 2], 0)
+    angles = {"theta_h": np.broadcast_to(middle[:, None], cos_d.shape), "theta_d": np.arccos(np.clip(cos_d, 0, 1)),
+              "theta_i": np.arccos(np.clip(i[..., 2], 0, 1))}  # fmt: skip
+    value = term.quotients(*np.moveaxis(i, -1, 0), *local_o)[0] * weight
+    for curve in term.curves:
+        if not curve.depends_on_view:
+            value = value * curve_values(term_document, curve, angles[curve.name])[0]
+    keep = value > 0
+    light = radiance_along((i[keep] @ frame).astype(np.float32))
+    return (value[keep][:, None] * light).sum(axis=0)
+
+
+@pytest.mark.parametrize("roughness", [0.01, 0.03, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("degrees", [0, 60])
+def test_white_light_is_reflected_without_loss_or_noise(roughness, degrees):
+    chrome, (normal, wo) = document("ggx", roughness=roughness, f0=1.0), view(degrees)
+    white = np.ones((64, 128, 3), np.float32)
+    radiance = shade(chrome, *with_lobe_rays(chrome, normal, wo, white))
+    expected = brute_force(chrome, normal, wo, lambda directions: np.ones((len(directions), 3)))
+    np.testing.assert_allclose(radiance.mean(axis=0), expected, rtol=0.01)
+    assert radiance.std() < 0.02 * expected[0]
+
+
+def sky_with_sun():
+    """A gradient, and a sun of some texels that brings half of the light."""
+    rng = np.random.default_rng(5)
+    radiance = np.linspace(0.2, 1, 128 * 3).reshape(128, 1, 3) * rng.uniform(0.8, 1.2, (128, 256, 1))
+    radiance[30:32, 70:72] = 3000
+    return radiance.astype(np.float32)
+
+
+@pytest.mark.parametrize("roughness", [0.03, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("rotation", [0.0, 50.0])
+def test_rays_and_triangles_together_are_the_integral(roughness, rotation):
+    """Also where the sun is in the lobe, by whichever estimator."""
+    gloss, sky = document("ggx", roughness=roughness, f0=0.5), sky_with_sun()
+    normal, wo = view(20)
+
+    def along(directions):
+        return lookup(sky, rotate_about_y(directions.astype(np.float64), -rotation).astype(np.float32))
+
+    lights, receivers = with_lobe_rays(gloss, normal, wo, sky, rotation=rotation, num_lights=1500)
+    radiance, expected = shade(gloss, lights, receivers).mean(axis=0), brute_force(gloss, normal, wo, along)
+    np.testing.assert_allclose(radiance, expected, rtol=0.03)
+
+
+def test_a_sun_in_the_lobe_is_no_noise():
+    gloss, sky = document("ggx", roughness=0.22, f0=0.5), sky_with_sun()
+    sun = (np.argmax(sky[..., 0]) // 256 + 0.5, np.argmax(sky[..., 0]) % 256 + 0.5)
+    azimuth, elevation = 2 * np.pi * (sun[1] / 256 - 0.5), np.pi * (0.5 - sun[0] / 128)
+    toward = np.array([np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])
+    normal = np.tile(toward, (NUM_POINTS, 1)).astype(np.float32)
+    radiance = shade(gloss, *with_lobe_rays(gloss, normal, normal, sky, num_lights=1500))
+    assert radiance.std(axis=0)[0] < 0.05 * radiance.mean(axis=0)[0]
+
+
+def test_rays_that_hit_a_patch_bring_its_light():
+    chrome, (normal, wo) = document("ggx", roughness=0.1, f0=1.0), view(40)
+    pattern = make_lobe_pattern(sample_lobe(chrome, NO_LEVELS), 55, 3)
+    patch = np.full((NUM_POINTS, 55), 7, np.uint16)
+    patch[:, ::2] = NO_HIT  # a surface without a patch is black
+    light = np.zeros((65_536, 3), np.float32)
+    light[7] = 1, 2, 3
+    hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), no_paths(NUM_POINTS))
+    points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
+    rays = LobeRays(hits, pattern, isotropic(light), NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+    listed = build_ray_lists(rays, points, 0, NUM_POINTS)
+    num = int(listed.first[-1])
+    assert 0.99 * 27 * NUM_POINTS < num <= 27 * NUM_POINTS  # few leave below the horizon
+    np.testing.assert_allclose(listed.irradiance[1, :num], 2 * listed.irradiance[0, :num], rtol=1e-5)
+    half = listed.wi[:, :num] + listed.wo[:, :num]
+    cos_theta_h = half[2] / np.linalg.norm(half, axis=0)
+    assert np.degrees(np.arccos(np.clip(np.median(cos_theta_h), 0, 1))) < 1
+
+
+def test_rows_keep_their_rays():
+    chrome, (normal, wo) = document("ggx", roughness=0.2, f0=1.0), view(30)
+    lights, receivers = with_lobe_rays(chrome, normal, wo, sky_with_sun())
+    whole = shade(chrome, lights, receivers)
+    rows = np.array([3, 9, 40])
+    np.testing.assert_allclose(shade(chrome, lights, receivers.subset(rows)), whole[rows], rtol=1e-4)
