@@ -198,7 +198,7 @@ class LobeHits:
 
 
 class PatchLookup(NamedTuple):
-    """What finds the patch of a hit.
+    """Data to find the patch of a hit.
 
     Attributes:
         tree: kd-tree of the patches. normals: of the faces. sides: index of each face's front side.
@@ -463,7 +463,8 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
             _locate_smoothly(packet, ray, lookup, lanes)
             for k in range(width):
                 patch[first + k, ray] = lanes.patches[k]
-                escapes[first + k, ray >> 3] |= (get_hit(packet, k)[0] < 0) << (ray & 7)
+                is_escaping = packet.is_active[k] != 0 and get_hit(packet, k)[0] < 0
+                escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
             if follows:
                 before = end
                 end = _follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)

@@ -252,7 +252,7 @@ def _from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _seen_behind(environment, blur, world):  # type: ignore[no-untyped-def]
+def _environment_behind(environment, blur, world):  # type: ignore[no-untyped-def]
     """Radiance of the environment behind a lobe: its texel, or behind a wide lobe a blurred texel without peaks.
 
     Args:
@@ -312,7 +312,7 @@ def _along_path(paths, first, last, outgoing, environment, surfaces, peaks):  # 
                 light = _from_peaks(peaks, surfaces, lobe, patch, (n[0], n[1], n[2]), direction)
         elif kind == ESCAPE:
             if environment.radiance.shape[0] > 0:
-                light = _seen_behind(environment, surfaces.blur[lobe], direction)
+                light = _environment_behind(environment, surfaces.blur[lobe], direction)
         elif patch != NO_PATCH:
             light = _from_patch(outgoing, patch, direction)
         red += paths.throughput[entry, 0] * light[0]

@@ -36,7 +36,7 @@ F32 = NDArray[np.float32]
 _ALBEDO_STEPS = 64
 _PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
 _MAX_LOBES = 255
-_WIDE = np.radians(1.0)  # median of a lobe in which suns are no texels
+_WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
 
@@ -149,7 +149,7 @@ def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | N
 
 
 def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
-    """Remove the gather rays of points whose light is traced along their lobe."""
+    """Remove the gather rays of points whose light is traced along their lobe. rays: of `receivers`"""
     is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
     gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
     return replace(rays, gather_hits=gather_hits)
@@ -202,6 +202,8 @@ def choose_peaks(
 ) -> tuple[NDArray[np.intp], Shaped[F32, "K 3"], Shaped[F32, "height width 3"]]:
     """Choose the brightest triangles of an environment: hardly any ray of two wide lobes meets them.
 
+    Args:
+        radiance: the map. tile: triangle of each texel. lights: the triangles.
     Returns:
         The triangles; the irradiance of their light above a limit, on surfaces perpendicular to it; the map without it.
     """
