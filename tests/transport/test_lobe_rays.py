@@ -36,7 +36,7 @@ def document(model, **params):
 
 
 def view(degrees):
-    """The same point many times, from one direction; seeds differ. Normals and wo, (n, 3)"""
+    """Return the same point many times, from one direction; seeds differ. Normals and wo, (n, 3)"""
     angle = np.radians(degrees)
     normal = np.tile(np.float32([0.36, 0.48, 0.8]), (NUM_POINTS, 1))
     wo = np.cos(angle) * normal + np.sin(angle) * any_tangent(normal)
