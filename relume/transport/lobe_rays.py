@@ -29,7 +29,8 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
 from relume.transport.gather_kernel import in_frame
 from relume.transport.light_culling import ListedLights, half_angle_reach
-from relume.transport.lobe_hits import ESCAPE, REFLECTION, LobeHits, LobeSurfaces, lobe_ray_in_pixel
+from relume.transport.lobe_hits import LobeHits, lobe_ray_in_pixel
+from relume.transport.lobe_paths import ESCAPE, REFLECTION, LobeSurfaces
 from relume.transport.outgoing_patch_light import OutgoingLight, bin_of
 from relume.transport.shading_points import ListedRays, ShadingPoints
 

@@ -16,18 +16,9 @@ from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import any_tangent
 from relume.scene.model import Material
-from relume.transport.lobe_hits import (
-    END,
-    ESCAPE,
-    NO_FOOTPRINT,
-    NO_SURFACES,
-    REFLECTION,
-    LobeHits,
-    LobeSurfaces,
-    PatchLookup,
-    lobe_ray_in_pixel,
-    trace_lobe_rays,
-)
+from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits, lobe_ray_in_pixel, trace_lobe_rays
+from relume.transport.lobe_paths import END, ESCAPE, NO_SURFACES, REFLECTION, LobeSurfaces
+from relume.transport.patch_lookup import PatchLookup
 
 NUM = 200
 CHROME = complete_term(("terms", 0), {"model": "ggx", "params": {"roughness": 0.1, "f0": 1.0}}, None)

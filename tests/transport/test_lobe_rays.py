@@ -19,7 +19,8 @@ from relume.lights.spherical_triangles import EnvironmentTexels, integrate_envir
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
-from relume.transport.lobe_hits import NO_FOOTPRINT, NO_SURFACES, LobeHits, no_paths
+from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
+from relume.transport.lobe_paths import NO_SURFACES, no_paths
 from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeRays
 from relume.transport.outgoing_patch_light import isotropic, no_light
 from relume.transport.shading.shader import Shader

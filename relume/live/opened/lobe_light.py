@@ -27,8 +27,10 @@ from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.store.bake_protocol import StoreReader
-from relume.transport.lobe_hits import LobeHits, LobeSurfaces, PatchLookup, patch_reach, trace_lobe_rays
+from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
+from relume.transport.lobe_paths import LobeSurfaces
 from relume.transport.lobe_rays import LobeEnvironment
+from relume.transport.patch_lookup import PatchLookup, patch_reach
 from relume.transport.shading_points import GatherRays, ShadingPoints
 
 F32 = NDArray[np.float32]
