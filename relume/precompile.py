@@ -57,6 +57,7 @@ RAY_MODELS = (
     "lambert",
     "ggx",
 )
+_POLISHED = {"roughness": 0.1, "f0": 0.9}
 
 
 def precompile() -> None:
@@ -105,6 +106,7 @@ def _exercise(method: BakeMethod, scene: Scene, folder: Path, models: Iterable[s
         return
     _apply_btf(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), folder)
     _edit(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), models)
+    _polish(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)))
     _move_lights(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)))
 
 
@@ -125,6 +127,14 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
             _render(picture)
     tone_map(picture.image(), 0.0, "agx")
     apply_lut(np.zeros((lut.SIZE, lut.SIZE, lut.SIZE, 3), np.uint16), np.zeros((1, 3), np.float32))
+
+
+def _polish(transfer: FixedViewTransfer, picture: Picture) -> None:
+    """Trace along the lobes of polished metals that see each other."""
+    terms = [{"model": "ggx", "params": _POLISHED, "texture": None}]
+    partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
+    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    _render(picture)
 
 
 def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:

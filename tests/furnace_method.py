@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from relume.assets.environments.equirect import texel_solid_angles
+from relume.brdf.lobe_sampling import LobeSampling
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.fixed_views import BakedFixedViews, SelectedSamples
@@ -56,8 +57,9 @@ class FurnaceViews(BakedFixedViews):
         light: Illumination,
         quality: LightQuality = LightQuality.EXACT,
         is_canceled: Callable[[], bool] = lambda: False,
+        lobe: LobeSampling | None = None,
     ) -> LightsAndPoints:
-        """Surface radiance along gather rays, without the environment."""
+        """Surface radiance along gather rays, without the environment; enough for any lobe, as it is the same."""
         rays = replace(samples.gather_rays(is_canceled), outgoing=self.glow(light))
         return self.lights.empty(), replace(samples.receivers(is_lit=False), rays=(rays,))
 

@@ -86,7 +86,7 @@ def _make_mitsuba_bsdf(kind: str) -> dict[str, Any]:
 
 
 def render_moving_camera(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.float32]:
-    """Render the image of a moving camera, with all light."""
+    """Render the image of a moving camera, with all light. bake, view, look: what is shown"""
     picture = FreeCameraPicture(bake, view, is_watched=True)
     picture.set_look(look)
     picture.advance(None)

@@ -69,7 +69,11 @@ class Sizes(NamedTuple):
 
 
 def measure(tiny: bool, kind: str = "metal", roughness: float = 0.1) -> list[Figure]:
-    """Measure one material, "metal" or "plastic". The bake is made once in a process."""
+    """Measure one material; the bake is made once in a process.
+
+    Args:
+        tiny: a trial run. kind: "metal" or "plastic". roughness: of its GGX term.
+    """
     is_metal = kind == "metal"
     name = f"sharp.rmse_{roughness}" if is_metal else f"sharp.rmse_{kind}_{roughness}"
     speckle_names = (f"sharp.speckle_{roughness}",) if is_metal else ()
@@ -111,7 +115,7 @@ def open_still_life(tiny: bool) -> FixedViewTransfer:
 
 
 def bake_and_open(scene: Scene, tiny: bool, folder: Path) -> FixedViewTransfer:
-    """A scene, baked for its fixed camera `VIEW` in a folder."""
+    """A scene, baked for its fixed camera `VIEW` in a folder. tiny: a trial run"""
     sizes = Sizes.choose(tiny)
     recipe = Recipe("gather", (VIEW,), sizes.size, sizes.lights)
     return open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
@@ -137,14 +141,14 @@ def allowed(roughness: float) -> float:
 
 
 def make_look(default: Mapping[str, Any], kind: str, roughness: float) -> Look:
-    """The default look with another teapot, as sharp as looks allow."""
+    """The default look with another teapot, as sharp as looks allow. kind, roughness: as in `measure`"""
     document = copy.deepcopy(dict(default))
     document["materials"][MATERIAL]["terms"] = make_terms(kind, allowed(roughness))
     return validate(document, default)
 
 
 def describe(kind: str, roughness: float, tiny: bool) -> dict[str, Any]:
-    """Context of all figures of a material."""
+    """Context of all figures of a material. kind, roughness, tiny: as in `measure`"""
     sizes = Sizes.choose(tiny)
     return {
         "kind": kind, "our_roughness": allowed(roughness), "size": list(sizes.size), "lights": sizes.lights,
@@ -153,7 +157,11 @@ def describe(kind: str, roughness: float, tiny: bool) -> dict[str, Any]:
 
 
 def teapot_passes(kind: str, roughness: float, tiny: bool) -> F32:
-    """Mitsuba's independent images, with more paths for the teapot. (passes, height, width, 3)"""
+    """Mitsuba's independent images, with more paths for the teapot. (passes, height, width, 3)
+
+    Args:
+        kind, roughness, tiny: as in `measure`.
+    """
     scene, sizes = built_in("still_life"), Sizes.choose(tiny)
     bsdfs, wood = [_describe_material(scene, mesh.material, kind, roughness) for mesh in scene.meshes], _wood(scene)
     rows, columns = _bound(find_teapot(tiny))

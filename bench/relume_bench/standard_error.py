@@ -83,5 +83,5 @@ def compare_with_passes(rendered: F64, passes: F32) -> NoiseCorrectedError:
 
 
 def compare_pixels(rendered: F64, passes: F32, mask: NDArray[np.bool_]) -> NoiseCorrectedError:
-    """As `compare_with_passes`, over some pixels. mask: (height, width)"""
+    """As `compare_with_passes`, over some pixels. rendered, passes: as there. mask: (height, width)"""
     return compare_with_passes(rendered[mask][None], passes[:, mask][:, None])

@@ -55,7 +55,11 @@ class LobePattern(NamedTuple):
 
 
 def make_lobe_pattern(sampling: LobeSampling, num_rays: int, seed: int) -> LobePattern:
-    """Distribute rays over a lobe. seed: only the lowest 31 bits count."""
+    """Distribute rays over a lobe.
+
+    Args:
+        sampling: the lobe. num_rays: rays of a point. seed: only the lowest 31 bits count.
+    """
     return LobePattern(
         fibonacci_lattice(num_rays).astype(np.float32),
         shortest_lattice_vectors(num_rays).astype(np.float32),

@@ -55,6 +55,9 @@ def allocate_list(num_points: int, capacity: int) -> ListedLights:
 def half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Return a bound of the half vector's rotation while wi rotates by `radius`, and cos θd.
 
+    Args:
+        radius: radians. ix, iy, iz: local wi. ox, oy, oz: local wo.
+
     The half vector is the middle of an arc of length 2θd with one fixed end. Moving the other end by dε moves the
     middle by at most dε / (2 cos θd), and θd by dε / 2.
     """

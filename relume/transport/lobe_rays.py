@@ -29,7 +29,8 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
 from relume.transport.gather_kernel import in_frame
 from relume.transport.light_culling import ListedLights, half_angle_reach
-from relume.transport.lobe_hits import ESCAPE, REFLECTION, LobeHits, LobeSurfaces, lobe_ray_in_pixel
+from relume.transport.lobe_hits import LobeHits, lobe_ray_in_pixel
+from relume.transport.lobe_paths import ESCAPE, REFLECTION, LobeSurfaces
 from relume.transport.outgoing_patch_light import OutgoingLight, bin_of
 from relume.transport.shading_points import ListedRays, ShadingPoints
 
@@ -252,7 +253,7 @@ def _from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _seen_behind(environment, blur, world):  # type: ignore[no-untyped-def]
+def _environment_behind(environment, blur, world):  # type: ignore[no-untyped-def]
     """Radiance of the environment behind a lobe: its texel, or behind a wide lobe a blurred texel without peaks.
 
     Args:
@@ -312,7 +313,7 @@ def _along_path(paths, first, last, outgoing, environment, surfaces, peaks):  # 
                 light = _from_peaks(peaks, surfaces, lobe, patch, (n[0], n[1], n[2]), direction)
         elif kind == ESCAPE:
             if environment.radiance.shape[0] > 0:
-                light = _seen_behind(environment, surfaces.blur[lobe], direction)
+                light = _environment_behind(environment, surfaces.blur[lobe], direction)
         elif patch != NO_PATCH:
             light = _from_patch(outgoing, patch, direction)
         red += paths.throughput[entry, 0] * light[0]

@@ -1,4 +1,4 @@
-"""How normal and view direction change within a sample's part of its pixel, from its neighbors in the image.
+"""Changes of normal and view direction within a sample's part of its pixel, from its neighbors in the image.
 
 A polished surface reflects many directions within one pixel where it is curved: its highlights are averaged over them.
 """

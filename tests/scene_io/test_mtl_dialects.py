@@ -129,7 +129,7 @@ def params_of(material: Material) -> dict[str, Any]:
         (BLENDER_4, 0.04, 0.5),
         (BLENDER_4.replace("Ks 0.500000 0.500000 0.500000", "Ks 1 1 1"), 0.08, 0.5),
         (BLENDER_2_8, 0.04, 0.4),
-        (BLENDER_2_8.replace("Ns 323.999994", "Ns 900"), 0.04, 0.03),
+        (BLENDER_2_8.replace("Ns 323.999994", "Ns 900"), 0.04, 0.01),
         (BLENDER_PBR, 0.02, 0.3),
         (MAYA, 0.04, 0.1**0.25),
         (SKETCHUP, 0.04, (2 / 52) ** 0.25),

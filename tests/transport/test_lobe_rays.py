@@ -19,7 +19,8 @@ from relume.lights.spherical_triangles import EnvironmentTexels, integrate_envir
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
-from relume.transport.lobe_hits import NO_FOOTPRINT, NO_SURFACES, LobeHits, no_paths
+from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
+from relume.transport.lobe_paths import NO_SURFACES, no_paths
 from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeRays
 from relume.transport.outgoing_patch_light import isotropic, no_light
 from relume.transport.shading.shader import Shader
@@ -36,7 +37,7 @@ def document(model, **params):
 
 
 def view(degrees):
-    """The same point many times, seen from one direction; seeds differ. Normals and wo, (n, 3)"""
+    """Return the same point many times, from one direction; seeds differ. Normals and wo, (n, 3)"""
     angle = np.radians(degrees)
     normal = np.tile(np.float32([0.36, 0.48, 0.8]), (NUM_POINTS, 1))
     wo = np.cos(angle) * normal + np.sin(angle) * any_tangent(normal)
@@ -106,7 +107,7 @@ def test_white_light_is_reflected_without_loss_or_noise(roughness, degrees):
     assert radiance.std() < 0.02 * expected[0]
 
 
-def sky_with_sun():
+def gradient_with_sun():
     """A gradient, and a sun of some texels that brings half of the light."""
     rng = np.random.default_rng(5)
     radiance = np.linspace(0.2, 1, 128 * 3).reshape(128, 1, 3) * rng.uniform(0.8, 1.2, (128, 256, 1))
@@ -118,24 +119,24 @@ def sky_with_sun():
 @pytest.mark.parametrize("rotation", [0.0, 50.0])
 def test_rays_and_triangles_together_are_the_integral(roughness, rotation):
     """Also where the sun is in the lobe, by whichever estimator."""
-    gloss, sky = document("ggx", roughness=roughness, f0=0.5), sky_with_sun()
+    gloss, radiance_map = document("ggx", roughness=roughness, f0=0.5), gradient_with_sun()
     normal, wo = view(20)
 
     def along(directions):
-        return lookup(sky, rotate_about_y(directions.astype(np.float64), -rotation).astype(np.float32))
+        return lookup(radiance_map, rotate_about_y(directions.astype(np.float64), -rotation).astype(np.float32))
 
-    lights, receivers = with_lobe_rays(gloss, normal, wo, sky, rotation=rotation, num_lights=1500)
+    lights, receivers = with_lobe_rays(gloss, normal, wo, radiance_map, rotation=rotation, num_lights=1500)
     radiance, expected = shade(gloss, lights, receivers).mean(axis=0), brute_force(gloss, normal, wo, along)
     np.testing.assert_allclose(radiance, expected, rtol=0.03)
 
 
 def test_a_sun_in_the_lobe_is_no_noise():
-    gloss, sky = document("ggx", roughness=0.22, f0=0.5), sky_with_sun()
-    sun = (np.argmax(sky[..., 0]) // 256 + 0.5, np.argmax(sky[..., 0]) % 256 + 0.5)
+    gloss, radiance_map = document("ggx", roughness=0.22, f0=0.5), gradient_with_sun()
+    sun = (np.argmax(radiance_map[..., 0]) // 256 + 0.5, np.argmax(radiance_map[..., 0]) % 256 + 0.5)
     azimuth, elevation = 2 * np.pi * (sun[1] / 256 - 0.5), np.pi * (0.5 - sun[0] / 128)
     toward = np.array([np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])
     normal = np.tile(toward, (NUM_POINTS, 1)).astype(np.float32)
-    radiance = shade(gloss, *with_lobe_rays(gloss, normal, normal, sky, num_lights=1500))
+    radiance = shade(gloss, *with_lobe_rays(gloss, normal, normal, radiance_map, num_lights=1500))
     assert radiance.std(axis=0)[0] < 0.05 * radiance.mean(axis=0)[0]
 
 
@@ -160,7 +161,7 @@ def test_rays_that_hit_a_patch_bring_its_light():
 
 def test_rows_keep_their_rays():
     chrome, (normal, wo) = document("ggx", roughness=0.2, f0=1.0), view(30)
-    lights, receivers = with_lobe_rays(chrome, normal, wo, sky_with_sun())
+    lights, receivers = with_lobe_rays(chrome, normal, wo, gradient_with_sun())
     whole = shade(chrome, lights, receivers)
     rows = np.array([3, 9, 40])
     np.testing.assert_allclose(shade(chrome, lights, receivers.subset(rows)), whole[rows], rtol=1e-4)

@@ -104,13 +104,13 @@ class LiveTerm:
         curve = lobe_curve(self.document["model"])
         return None if curve is None or curve.name in basis.affected_curves else self.lobe
 
-    def mark_untraced(self, image: DisplayedImage) -> DisplayedImage:
+    def mark_lobe(self, image: DisplayedImage) -> DisplayedImage:
         """Return an operator's image, marked if the operator changes the lobe, which it cannot trace."""
         basis, curve = image.basis, lobe_curve(self.document["model"])
         changes_lobe = basis is not None and curve is not None and curve.name in basis.affected_curves
         return replace(image, traces_lobe=False) if changes_lobe and image.traces_lobe else image
 
-    def _is_untraced(self, image: DisplayedImage) -> bool:
+    def _lacks_lobe(self, image: DisplayedImage) -> bool:
         """Return whether an image does not trace the narrow lobe of the target."""
         return not image.traces_lobe and self.lobe is not None
 
@@ -181,7 +181,7 @@ class LiveTerm:
     def is_exact(self) -> bool:
         """Return whether the newest image shows the target exactly."""
         ready = self.ready
-        return ready.fidelity == Fidelity.EXACT and not self.changed_curves() and not self._is_untraced(ready)
+        return ready.fidelity == Fidelity.EXACT and not self.changed_curves() and not self._lacks_lobe(ready)
 
     def has_preview(self) -> bool:
         """Return whether a preview shows the target, so that shading may wait for the end of the drag.
@@ -203,7 +203,7 @@ class LiveTerm:
         """Fidelity of the displayed image with respect to the look."""
         displayed = self.displayed
         is_current = displayed.light == self.light and not displayed.changed_curves(self.target_bands)
-        limit = Fidelity.NEAR_EXACT if self._is_untraced(displayed) else Fidelity.EXACT
+        limit = Fidelity.NEAR_EXACT if self._lacks_lobe(displayed) else Fidelity.EXACT
         return min(displayed.fidelity, limit if is_current else Fidelity.APPROXIMATE)
 
     def operator_key(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:

@@ -27,8 +27,10 @@ from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.store.bake_protocol import StoreReader
-from relume.transport.lobe_hits import LobeHits, LobeSurfaces, PatchLookup, patch_reach, trace_lobe_rays
+from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
+from relume.transport.lobe_paths import LobeSurfaces
 from relume.transport.lobe_rays import LobeEnvironment
+from relume.transport.patch_lookup import PatchLookup, patch_reach
 from relume.transport.shading_points import GatherRays, ShadingPoints
 
 F32 = NDArray[np.float32]
@@ -36,7 +38,7 @@ F32 = NDArray[np.float32]
 _ALBEDO_STEPS = 64
 _PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
 _MAX_LOBES = 255
-_WIDE = np.radians(1.0)  # median of a lobe in which suns are no texels
+_WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
 
@@ -149,7 +151,7 @@ def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | N
 
 
 def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
-    """Remove the gather rays of points whose light is traced along their lobe."""
+    """Remove the gather rays of points whose light is traced along their lobe. rays: of `receivers`"""
     is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
     gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
     return replace(rays, gather_hits=gather_hits)
@@ -202,6 +204,8 @@ def choose_peaks(
 ) -> tuple[NDArray[np.intp], Shaped[F32, "K 3"], Shaped[F32, "height width 3"]]:
     """Choose the brightest triangles of an environment: hardly any ray of two wide lobes meets them.
 
+    Args:
+        radiance: the map. tile: triangle of each texel. lights: the triangles.
     Returns:
         The triangles; the irradiance of their light above a limit, on surfaces perpendicular to it; the map without it.
     """

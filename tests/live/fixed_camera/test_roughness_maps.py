@@ -112,7 +112,7 @@ def test_roughness_slider_scales_the_map(direct) -> None:
     picture = shown(direct)
     picture.prepare(FLOOR + "params/roughness")
     run_next_job(picture)
-    for roughness in (0.9, 0.7):  # wide at all levels: narrow lobes are traced at rest
+    for roughness in (0.9, 0.7):  # wide at all levels: narrow lobes are traced when it stops
         picture.set_look(changed(direct, roughness=roughness))
         assert picture.next_job() is None or picture.next_job().is_refinement
         assert picture.advance(8).changed

@@ -45,7 +45,7 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     if operator is not None:
         after = advance(live.ready, live.target_bands, operator, max_coefficients)
         if after is not live.ready:
-            live.set_ready(live.mark_untraced(after))
+            live.set_ready(live.mark_lobe(after))
 
 
 def advance(

@@ -111,7 +111,7 @@ class OperatorPrecompute:
         improves_fidelity = ready.fidelity < Fidelity.EXACT and self.basis.is_complete
         if not changed <= set(self.basis.affected_curves) or (changed and not has_coefficients) or improves_fidelity:
             after = ready.evaluate_operator(result, self.basis, live.target_bands, live.light)
-            live.set_ready(live.mark_untraced(after))
+            live.set_ready(live.mark_lobe(after))
         elif not has_coefficients:
             live.set_ready(replace(ready, basis=self.basis, coefficients=self.basis.coefficients(live.target_bands)))
 
