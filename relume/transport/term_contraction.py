@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -71,7 +72,14 @@ class Contraction(NamedTuple):
         return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
 
     def whole(self) -> WholeCurves:
-        """Sum all curves, if none is free and each has one setting."""
+        """Sum all curves, if none is free and each has one setting; once, as every range of points asks."""
+        key = id(self.bands)
+        if key not in _whole_curves:
+            _whole_curves[key] = self._sum_curves()
+            weakref.finalize(self.bands, _whole_curves.pop, key, None).atexit = False
+        return _whole_curves[key]
+
+    def _sum_curves(self) -> WholeCurves:
         steps = np.zeros((*self.bands.shape, 3), np.float32)
         for curve_steps, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
             values = bands[:, :num][:, ::-1]
@@ -79,6 +87,10 @@ class Contraction(NamedTuple):
             curve_steps[:, :num] = np.stack([values, values.cumsum(axis=1), variation.cumsum(axis=1)], axis=2)[:, ::-1]
         steps[np.abs(steps) < _MIN_STEP] = 0
         return WholeCurves(self.kinds, self.axes, self.scale, steps, self.num_rows)
+
+
+_whole_curves: dict[int, WholeCurves] = {}
+"""By identity of `Contraction.bands`, as long as these exist."""
 
 
 def _support(rows: NDArray[np.float64]) -> float:
