@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { albedoMessage } from "../src/panels/inspector/albedo";
 import { btfOf, limitToStored, isWithinStored } from "../src/panels/inspector/measuredInfo";
-import { isSoftMirror, texturesOf } from "../src/panels/inspector/terms";
+import { isMirror, texturesOf } from "../src/panels/inspector/terms";
 import type { ModelBody, ParameterBody, Rgb, SceneBody, Term } from "../src/protocol";
 import { models, scene } from "../src/state/scene";
 
@@ -22,7 +22,7 @@ test("a material offers the images that its own terms take, in their order", () 
   expect(texturesOf("Nothing")).toEqual([]);
 });
 
-test("a material that was no mirror when it was baked reflects softly once it is polished", () => {
+test("a smooth, untextured term is a mirror if its facets are not drawn", () => {
   const curves = ["theta_h", "theta_d", "theta_i"].map((name) => ({ name, angle: name }));
   models.value = [
     { model: "ggx", width_parameter: "roughness", specular_below: 0.06, curves },
@@ -34,23 +34,17 @@ test("a material that was no mirror when it was baked reflects softly once it is
     texture: "specular",
     ...fields,
   });
-  const materials = [
-    { name: "Chrome", terms: [ggx(0.03)] },
-    { name: "Paint", terms: [ggx(0.4)] },
-  ];
-  scene.value = { materials } as unknown as SceneBody;
   const drawn = [{ knots: [] }] as unknown as NonNullable<Term["curves"]>[string];
-  expect(isSoftMirror("Paint", ggx(0.05))).toBe(true);
-  expect(isSoftMirror("Paint", ggx([0.3, 0.3, 0.05]))).toBe(true);
-  expect(isSoftMirror("Paint", ggx(0.06))).toBe(false);
-  expect(isSoftMirror("Paint", ggx(0.05, { texture: "diffuse" }))).toBe(false);
-  expect(isSoftMirror("Paint", ggx(0.05, { roughness_map: "roughness" }))).toBe(false);
-  expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
-  expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
-  expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_i: drawn } }))).toBe(true);
-  expect(isSoftMirror("Paint", ggx(0.05, { model: "lambert" }))).toBe(false);
-  expect(isSoftMirror("Chrome", ggx(0.02))).toBe(false);
-  expect(isSoftMirror("Nothing", ggx(0.02))).toBe(false);
+  expect(isMirror(ggx(0.05))).toBe(true);
+  expect(isMirror(ggx([0.3, 0.3, 0.05]))).toBe(true);
+  expect(isMirror(ggx(0.06))).toBe(false);
+  expect(isMirror(ggx(0.05, { texture: "diffuse" }))).toBe(false);
+  expect(isMirror(ggx(0.05, { roughness_map: "roughness" }))).toBe(false);
+  expect(isMirror(ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
+  expect(isMirror(ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
+  expect(isMirror(ggx(0.05, { curves: { theta_i: drawn } }))).toBe(true);
+  expect(isMirror(ggx(0.05, { model: "lambert" }))).toBe(false);
+  expect(isMirror(ggx(0.02))).toBe(true);
 });
 
 test("a warning is shown only if a material reflects more light than it receives", () => {

@@ -20,7 +20,7 @@ import { ColorField } from "../../ui/ColorField";
 import { ZernikeFit } from "./ZernikeFit";
 import { ParamRow } from "./ParamRow";
 import { btfOf, getStoredQuality, limitToStored, isWithinStored } from "./measuredInfo";
-import { hasRoughnessMap, isSoftMirror, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
+import { hasRoughnessMap, modelsFor, TEXTURES, texturesOf, withModel } from "./terms";
 import { useServerQuery } from "./useServerQuery";
 
 interface Props {
@@ -196,12 +196,6 @@ export function TermCard({ material, term, index, onRemove }: Props) {
                 onHold={() => beginDrag(`${path}/params/${info.name}`)}
               />
             ))}
-          {isSoftMirror(material, term) && (
-            <p class="aside">
-              This material was not a mirror when the scene was baked, so sharp reflections are blurred. Bake again to
-              see them.
-            </p>
-          )}
           {model !== undefined && <TermCurves model={model} term={term} index={index} />}
           <ZernikeFit term={term} material={material} />
         </>

@@ -27,11 +27,6 @@ export function isMirror(term: Term): boolean {
   return [term.params?.[width_parameter] ?? below].flat().some((value) => value < below);
 }
 
-/** True if a term's reflections are blurred because its material was not a mirror when the scene was baked. */
-export function isSoftMirror(material: string, term: Term): boolean {
-  return isMirror(term) && materialOf(material)?.terms.some(isMirror) === false;
-}
-
 export function defaultTerm(model: ModelBody): Term {
   return {
     model: model.model,
