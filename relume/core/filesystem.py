@@ -11,6 +11,7 @@ from pathlib import Path
 
 from relume.core.errors import DiskFullError, RelumeError, is_disk_full
 
+_FULL_BYTES = 1 << 20  # a disk with less is full
 UNFINISHED = ".unfinished-*"
 """Glob pattern of files and folders that a killed process left behind."""
 
@@ -34,9 +35,11 @@ def atomic_write(path: Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         os.replace(unfinished, path)
     except OSError as error:
-        if is_disk_full(error):
+        # image libraries raise errors without a number, and with the path of the machine
+        is_full = error.errno is None and shutil.disk_usage(path.parent).free < _FULL_BYTES
+        if is_disk_full(error) or is_full:
             raise DiskFullError(path.name) from error
-        reason = error.strerror or str(error)
+        reason = error.strerror or (str(error) if error.errno is not None else type(error).__name__)
         raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
     finally:
         unfinished.unlink(missing_ok=True)

@@ -47,6 +47,19 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path, raised: 
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_errors_of_image_libraries_tell_a_full_disk_and_no_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They have no number, and name the unfinished file."""
+    error = OSError(f"Failed write: {tmp_path}")
+    with pytest.raises(RelumeError, match=r"a\.exr cannot be written \(OSError\)") as raised:
+        write(tmp_path / "a.exr", error)
+    assert not isinstance(raised.value, DiskFullError)
+    monkeypatch.setattr("relume.core.filesystem._FULL_BYTES", 1 << 62)
+    with pytest.raises(DiskFullError):
+        write(tmp_path / "a.exr", error)
+
+
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 def test_a_full_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
     def no_space(*_: object) -> None:

@@ -157,10 +157,13 @@ def test_external_cluster_without_tls_reports_the_missing_settings() -> None:
         Executors("tls://127.0.0.1:1").cluster()
 
 
-def test_worker_processes_have_low_priority() -> None:
+def test_worker_processes_have_low_priority_and_the_server_keeps_no_messages_to_them() -> None:
     executors = Executors(num_workers=1)
     assert not executors.has_cluster
     try:
+        executors.cluster()
+        streams = executors._cluster.scheduler.stream_comms.values()
+        assert [stream.recent_message_log.maxlen for stream in streams] == [0]
         niceness = executors.cluster().submit(os.getpriority, os.PRIO_PROCESS, 0).result(60)
         assert executors.has_cluster
     finally:

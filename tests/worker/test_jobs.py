@@ -11,7 +11,7 @@ import pytest
 from pydantic import BaseModel
 from sqlalchemy import select, update
 
-from relume.core.errors import CancelledError, RelumeError
+from relume.core.errors import CancelledError, DiskFullError, RelumeError
 from relume_worker.database import open_database
 from relume_worker.database.models import JobRow
 from relume_worker.jobs.fair_share import FairShare, Waiting
@@ -206,6 +206,28 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path, 
     jobs.service.close()
     assert sorted(machine.done) == sorted("aAb" * 4)
     assert machine.done[:7].count("b") >= 3, "bob has half of the turns while he waits"
+
+
+def test_job_is_deleted_if_the_ledger_has_no_disk_space(
+    tmp_path: Path, ledger: Ledger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its files are deleted first, which makes room for the ledger."""
+    jobs = Jobs(ledger, tmp_path, Machine())
+    jobs.service.start()
+    identity = jobs.submit("a")
+    jobs.wait(identity)
+    delete = jobs.service.ledger.delete
+
+    def delete_where_there_is_room(identities: Sequence[str]) -> Any:
+        if (tmp_path / identities[0]).exists():
+            raise DiskFullError("the database")
+        return delete(identities)
+
+    monkeypatch.setattr(jobs.service.ledger, "delete", delete_where_there_is_room)
+    jobs.frames.delete(identity)
+    jobs.service.close()
+    assert not (tmp_path / identity).exists()
+    assert not jobs.service.ledger.exists(identity)
 
 
 def test_frames_of_one_job_take_all_slots(tmp_path: Path, ledger: Ledger) -> None:

@@ -489,6 +489,24 @@ def test_bake_deleted_at_the_end_of_a_task_is_not_a_failure(
     assert [record.message for record in caplog.records if "failed" in record.message] == []
 
 
+def test_folder_that_a_task_writes_after_its_bake_was_deleted_is_deleted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    is_written = threading.Event()
+
+    def write_deleted(job: BakeInput, task: Task) -> TaskCost:
+        delete_bakes(service.data_dir, service.ledger, [job.bake_id])
+        (tmp_path / "bakes" / "staging" / f"{job.bake_id}.zarr" / "views").mkdir(parents=True)
+        is_written.set()
+        raise KeyError("lights/irradiance")
+
+    monkeypatch.setattr("relume_worker.runner.run_task", write_deleted)
+    with open_service(tmp_path) as service:
+        service.submit(SCENE.id, RECIPE)
+        assert is_written.wait(30)
+    assert list((tmp_path / "bakes" / "staging").iterdir()) == []
+
+
 def test_bake_deleted_during_a_task_is_not_a_defect(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

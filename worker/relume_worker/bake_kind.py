@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
@@ -21,6 +22,7 @@ from relume_worker.jobs.kind import Kind
 from relume_worker.ledger import Ledger
 from relume_worker.paths import staging_path
 from relume_worker.progress import ExpectedWork
+from relume_worker.run_marker import delete_run
 from relume_worker.runner import SCHEDULER_LOST_MESSAGE, BakeRunner
 from relume_worker.status import BakeStatus
 from relume_worker.status_bus import BlockedBake
@@ -55,6 +57,12 @@ class BakeKind(Kind):
         self._is_crowding = threading.Event()
         self._start_s = START_S
         self.blocked = BlockedBake()
+
+    def on_deleted(self, identity: str) -> None:
+        """Delete what tasks wrote after the files had been deleted."""
+        staging = staging_path(self._data_dir, identity)
+        shutil.rmtree(staging, ignore_errors=True)
+        delete_run(staging)
 
     def has_room(self, work: Waiting, running: Collection[Waiting]) -> bool:
         """One at a time: a bake takes all cores; small ones have a lane of their own, and never wait for a long one."""

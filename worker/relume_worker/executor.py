@@ -49,6 +49,8 @@ SINGLE_THREAD_ENV = dict.fromkeys(
     ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 
+# Else each connection keeps its last thousand messages and the requests in them: gigabytes for frames of many looks.
+NO_MESSAGE_LOGS: dict[str, Any] = {"distributed.admin.low-level-log-length": 0}
 # The ledger decides about retries; results are a few numbers, so nothing is spilled to disk. Dask's profiler, with a
 # hundred samples per second, took 2 % of a core from each tracing worker.
 DASK_CONFIG: dict[str, Any] = {
@@ -176,6 +178,7 @@ class Executors:
         from distributed import Client
 
         logging.getLogger("distributed").setLevel(logging.WARNING)  # Dask sets its own when it is imported
+        dask.config.set(NO_MESSAGE_LOGS)  # also for connections of workers that start later
         with dask.config.set(DASK_CONFIG):
             check_certificates(self.scheduler)
             address = self.scheduler or self._start_cluster()

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Generic
 
+from relume.core.errors import DiskFullError
 from relume_worker.database.models import JobRow
 from relume_worker.job_state import ACTIVE_STATES
 from relume_worker.jobs.claim import claim
@@ -152,7 +153,11 @@ class JobKind(Kind, Generic[Request]):
     def delete(self, identity: str) -> None:
         """Stop a job and delete its files. Raises NotFoundError."""
         self.get(identity)
-        self._service.ledger.delete([identity])
+        try:
+            self._service.ledger.delete([identity])
+        except DiskFullError:  # deleting a row needs space, too: first free that of the files
+            shutil.rmtree(self.folder / identity, ignore_errors=True)
+            self._service.ledger.delete([identity])
         shutil.rmtree(self.folder / identity, ignore_errors=True)
 
     def stop(self, identity: str) -> None:
