@@ -35,14 +35,21 @@ def atomic_write(path: Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         os.replace(unfinished, path)
     except OSError as error:
-        # image libraries raise errors without a number, and with the path of the machine
-        is_full = error.errno is None and shutil.disk_usage(path.parent).free < _FULL_BYTES
-        if is_disk_full(error) or is_full:
+        if is_disk_full(error) or (error.errno is None and _has_no_space(path.parent)):
             raise DiskFullError(path.name) from error
+        # image libraries raise errors without a number, and with the path of the machine
         reason = error.strerror or (str(error) if error.errno is not None else type(error).__name__)
         raise RelumeError(f"{path.name} cannot be written ({reason}); check the folder and its free space") from error
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def _has_no_space(folder: Path) -> bool:
+    """Return whether the disk of a folder is full; False if there is no such folder."""
+    try:
+        return shutil.disk_usage(folder).free < _FULL_BYTES
+    except OSError:
+        return False
 
 
 def remove_folder(path: Path) -> None:

@@ -230,6 +230,20 @@ def test_job_is_deleted_if_the_ledger_has_no_disk_space(
     assert not jobs.service.ledger.exists(identity)
 
 
+def test_job_that_waits_for_disk_space_says_so(tmp_path: Path, ledger: Ledger) -> None:
+    """The ledger cannot store the reason; the job goes on by itself, and then there is none."""
+    jobs = Jobs(ledger, tmp_path, Machine())
+    identity = jobs.submit("a")
+    jobs.frames.on_blocked(identity, DiskFullError("the database"))
+    assert "the disk is full; free some space, then try again; the job resumes by itself" in str(
+        jobs.frames.get(identity).problem
+    )
+    jobs.service.start()
+    jobs.wait(identity)
+    jobs.service.close()
+    assert jobs.frames.get(identity).problem is None
+
+
 def test_frames_of_one_job_take_all_slots(tmp_path: Path, ledger: Ledger) -> None:
     machine = Machine(3)
     jobs = Jobs(ledger, tmp_path, machine, num_slots=3)

@@ -42,6 +42,7 @@ class JobKind(Kind, Generic[Request]):
         """
         self._service, self.folder = service, folder
         self._timers: dict[str, StepTimer] = {}
+        self._blocked: dict[str, str] = {}  # reasons that the ledger cannot store, such as a full disk
         service.add_kind(self)
 
     @abstractmethod
@@ -62,6 +63,7 @@ class JobKind(Kind, Generic[Request]):
 
     def perform(self, work: Waiting) -> Mapping[str, Any]:
         """Read the request, claim the folder, and run the steps."""
+        self._blocked.pop(work.id, None)
         job = self.get(work.id)
         self.check_readable(job)
         folder, (is_first, step_s) = self.folder / job.id, (self.is_first(job.request), self.step_s(job.request))
@@ -79,8 +81,14 @@ class JobKind(Kind, Generic[Request]):
         """The service's sentence."""
         return self._service.describe(error)
 
+    def on_blocked(self, identity: str, error: Exception) -> None:
+        """Keep the reason until the job goes on."""
+        if isinstance(error, DiskFullError):
+            self._blocked[identity] = f"{error}; the job resumes by itself"
+
     def on_deleted(self, identity: str) -> None:
         """Delete the files."""
+        self._blocked.pop(identity, None)
         shutil.rmtree(self.folder / identity, ignore_errors=True)
 
     def submit(
@@ -125,6 +133,8 @@ class JobKind(Kind, Generic[Request]):
         total, timer = self.steps(request), self._timers.get(row.id) if row.state == "running" else None
         progress = min(1.0, (row.done + (timer.fraction if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
+        if state in ACTIVE_STATES:
+            problem = problem or self._blocked.get(row.id)
         times = row.created, row.started, row.ended
         return Job(row.id, request, row.client or "", state, row.done, total, progress, seconds_left, problem, *times)
 
