@@ -45,6 +45,19 @@ def differs(editor: Editor, before: NDArray[np.int16], least: float = 0.02) -> N
     editor.wait_until_exact()
 
 
+def settled(editor: Editor) -> NDArray[np.int16]:
+    """The exact picture of a new size: until the server has it, that of the old size counts as exact."""
+    pictures: list[NDArray[np.int16]] = [editor.pixels()]
+
+    def is_still() -> bool:
+        time.sleep(0.5)
+        pictures.append(editor.pixels())
+        return changed(pictures[-2], pictures[-1]) == 0
+
+    wait_until(is_still, "the picture goes on changing")
+    return pictures[-1]
+
+
 def comes_back(editor: Editor, before: NDArray[np.int16], left: int = 0) -> None:
     """Wait until the picture is the one that was, right of a menu of that many pixels."""
     wait_until(lambda: changed(before[:, left:], editor.pixels()[:, left:]) < 0.02, "the picture is not what it was")
@@ -155,8 +168,7 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
         menu.get_by_label(f"{side}, pixels").fill(pixels)
         page.keyboard.press("Enter")
     expect(page.get_by_role("button", name="90×160, free camera")).to_be_visible()
-    moving.wait_until_exact()
-    there = moving.read_pixels()
+    there = settled(moving)
     menu.get_by_role("button", name="Save this camera").click()
     menu.get_by_role("button", name="Rename View 1").click()
     page.keyboard.type("Near")
