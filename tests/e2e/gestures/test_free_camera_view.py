@@ -52,7 +52,8 @@ def settled(editor: Editor) -> NDArray[np.int16]:
     def is_still() -> bool:
         time.sleep(0.5)
         pictures.append(editor.pixels())
-        return changed(pictures[-2], pictures[-1]) == 0
+        before, after = pictures[-2:]
+        return before.shape == after.shape and changed(before, after) == 0
 
     wait_until(is_still, "the picture goes on changing")
     return pictures[-1]
