@@ -101,14 +101,17 @@ class LiveTerm:
 
     def lobe_beside(self, basis: EditBasis) -> LobeSampling | None:
         """Return the lobe along which the light of an operator is traced; None if the basis changes the lobe."""
-        curve = lobe_curve(self.document["model"])
-        return None if curve is None or curve.name in basis.affected_curves else self.lobe
+        return None if self._changes_lobe(basis) else self.lobe
 
     def mark_lobe(self, image: DisplayedImage) -> DisplayedImage:
         """Return an operator's image, marked if the operator changes the lobe, which it cannot trace."""
-        basis, curve = image.basis, lobe_curve(self.document["model"])
-        changes_lobe = basis is not None and curve is not None and curve.name in basis.affected_curves
+        changes_lobe = image.basis is not None and self._changes_lobe(image.basis)
         return replace(image, traces_lobe=False) if changes_lobe and image.traces_lobe else image
+
+    def _changes_lobe(self, basis: EditBasis) -> bool:
+        """Return whether the curve that shapes the lobe is free in a basis."""
+        curve = lobe_curve(self.document["model"])
+        return curve is not None and curve.name in basis.affected_curves
 
     def _lacks_lobe(self, image: DisplayedImage) -> bool:
         """Return whether an image does not trace the narrow lobe of the target."""

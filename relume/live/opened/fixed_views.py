@@ -276,11 +276,17 @@ class BakedFixedViews:
         tile = self.cache.get_value(
             (self.key, "tile of texels", key), lambda: tile_of_texels(self.tiles, radiance.shape[:2], rotation)
         )
-        gain = np.array(light.environment_gain, np.float32)
-        weighted = radiance if np.all(gain == 1) else radiance * gain
-        peaks, irradiance, without_peaks = choose_peaks(weighted, tile, lights)
-        environment = lobe_environment(weighted, tile, rotation, lights, without_peaks, is_direct=light.paths.direct)
-        return environment, LobePeaks(lights.direction[peaks], irradiance, self._patch_visibility(peaks))
+        is_direct = light.paths.direct
+
+        def compute() -> tuple[LobeEnvironment, LobePeaks]:
+            gain = np.array(light.environment_gain, np.float32)
+            weighted = radiance if np.all(gain == 1) else radiance * gain
+            peaks, irradiance, without_peaks = choose_peaks(weighted, tile, lights)
+            environment = lobe_environment(weighted, tile, rotation, lights, without_peaks, is_direct=is_direct)
+            return environment, LobePeaks(lights.direction[peaks], irradiance, self._patch_visibility(peaks))
+
+        cache_key = self.key, "lobe environment", key, light.environment_gain, is_direct
+        return self.cache.transient.get_value(cache_key, compute)
 
     def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
         """Return the fraction of each patch's points that see some light triangles: there are no patches."""

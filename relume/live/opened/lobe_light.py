@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Shaped
@@ -83,10 +83,10 @@ class LobeTracer:
             tint: mean of the specular texture of each patch.
         """
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
+        materials = [index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]
         found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
-        row = np.full(len(geometry.face_material) and int(geometry.face_material.max()) + 1, -1, np.int32)
-        for k, index in enumerate([index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]):
-            row[index] = k
+        row = np.full(len(reflectances), -1, np.int32)
+        row[materials] = np.arange(len(materials))
         quantile, band_density = (
             _padded([lobe.quantile[0] for lobe, _ in found]),
             _padded([lobe.band_density[0] for lobe, _ in found]),
@@ -143,6 +143,7 @@ def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "step
     return np.stack([np.interp(cosine, np.cos(theta_o)[::-1], column[::-1]) for column in values.T], axis=1)
 
 
+@lru_cache(maxsize=64)
 def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
     """Return the lobe of a material whose highlights are narrow and strong, and their terms; None for others."""
     lobes = (sample_lobe(document, NO_LEVELS) for document in reflectance.lobes)
