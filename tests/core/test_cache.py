@@ -154,6 +154,7 @@ BOUNDED = {
     "live/free_camera/basis/lobe_shapes.py",
     "live/free_camera/basis/outgoing_coefficients.py",
     "live/free_camera/normal_mapping.py",
+    "live/opened/lobe_light.py",
     "look/library/materials.py",
     "look/library/navigation_map.py",
     "math/angle_bands.py",
