@@ -73,17 +73,14 @@ NO_FOOTPRINT = np.zeros((1, 2, 2, 3), np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def lobe_ray_in_pixel(pattern, level, ray, shift, normal, tangent, wo, footprint, seed):  # type: ignore[no-untyped-def]
-    """World-space direction of a ray from somewhere within its point's part of a pixel.
+def jittered_frame(normal, tangent, wo, footprint, u, v):  # type: ignore[no-untyped-def]
+    """Shading frame of a point somewhere within its part of a pixel.
 
     Args:
-        pattern, level, ray, shift: as in `lobe_ray`. normal, tangent, wo: of the point. footprint: of the point.
-        seed: of the point.
+        normal, tangent, wo: of the point. footprint: of the point. u, v: where, from −½ to ½.
     Returns:
-        The direction, a tuple; True if the ray is above the horizon and must be traced.
+        Tangent, bitangent and normal; the local wo there. Tuples.
     """
-    u, v = ray_jitter(ray, np.uint32(seed) ^ _PIXEL_SEED)
-    u, v = u - _HALF, v - _HALF
     nx = normal[0] + u * footprint[0, 0, 0] + v * footprint[0, 1, 0]
     ny = normal[1] + u * footprint[0, 0, 1] + v * footprint[0, 1, 1]
     nz = normal[2] + u * footprint[0, 0, 2] + v * footprint[0, 1, 2]
@@ -99,8 +96,23 @@ def lobe_ray_in_pixel(pattern, level, ray, shift, normal, tangent, wo, footprint
     scale = _ONE / math.sqrt(tx * tx + ty * ty + tz * tz)
     t = tx * scale, ty * scale, tz * scale
     b, local = in_frame((nx, ny, nz), t, (ox, oy, oz))
+    return (t, b, (nx, ny, nz)), local
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def lobe_ray_in_pixel(pattern, level, ray, shift, normal, tangent, wo, footprint, seed):  # type: ignore[no-untyped-def]
+    """World-space direction of a ray from somewhere within its point's part of a pixel.
+
+    Args:
+        pattern, level, ray, shift: as in `lobe_ray`. normal, tangent, wo: of the point. footprint: of the point.
+        seed: of the point.
+    Returns:
+        The direction, a tuple; True if the ray is above the horizon and must be traced.
+    """
+    u, v = ray_jitter(ray, np.uint32(seed) ^ _PIXEL_SEED)
+    (t, b, n), local = jittered_frame(normal, tangent, wo, footprint, u - _HALF, v - _HALF)
     (x, y, z), band = lobe_ray(pattern, level, ray, shift, local[0], local[1], max(local[2], _MIN_COSINE))
-    d = t[0] * x + b[0] * y + nx * z, t[1] * x + b[1] * y + ny * z, t[2] * x + b[2] * y + nz * z
+    d = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
     return d, z > 0 and band >= 0 and d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2] > 0
 
 

@@ -151,9 +151,9 @@ def _levels(receivers: ShadingPoints) -> NDArray[np.uint8]:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _spread(footprint, p):  # type: ignore[no-untyped-def]
-    """Angle by which half vectors change at most between the middle and a corner of a point's footprint, radians."""
-    sides, total = footprint[min(p, footprint.shape[0] - 1)], _ZERO
+def spread_of(sides):  # type: ignore[no-untyped-def]
+    """Angle by which half vectors change at most between the middle and a corner of a footprint, radians."""
+    total = _ZERO
     for axis in range(2):
         n, o = sides[0, axis], sides[1, axis]
         total += _HALF * np.float32(math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]))
@@ -166,7 +166,7 @@ def _triangle_share(pattern, level, radius, solid_angle, spread, ix, iy, iz, ox,
     """Share t of a triangle at a point.
 
     Args:
-        pattern, level: of the point. radius, solid_angle: of the triangle. spread: from `_spread`.
+        pattern, level: of the point. radius, solid_angle: of the triangle. spread: from `spread_of`.
         ix, iy, iz: local direction of the triangle. ox, oy, oz: local wo.
     """
     if pattern.is_half_angle:
@@ -186,7 +186,10 @@ def _share_triangles(pattern, footprint, level, radius, solid_angle, start, num,
     """Multiply listed triangles by their share; see `LobeRays.share_triangles`."""
     wi, wo = listed.wi, listed.wo
     for row in range(num):
-        point_level, spread = level[min(start + row, level.shape[0] - 1)], _spread(footprint, start + row)
+        point_level, spread = (
+            level[min(start + row, level.shape[0] - 1)],
+            spread_of(footprint[min(start + row, footprint.shape[0] - 1)]),
+        )
         if not pattern.is_narrow[point_level]:
             continue
         for entry in range(listed.first[row], listed.first[row + 1]):
@@ -219,7 +222,7 @@ def _from_environment(environment, pattern, level, spread, frame, world, jitter,
     """Radiance of the environment along a ray, less the share of the triangle that it meets.
 
     Args:
-        spread: from `_spread`. frame: tangent, bitangent and normal of the point.
+        spread: from `spread_of`. frame: tangent, bitangent and normal of the point.
         world: world-space direction of the ray.
         jitter: see `_texel`. o: local wo.
     """
@@ -240,7 +243,7 @@ def _from_environment(environment, pattern, level, spread, frame, world, jitter,
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
+def from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
     """Radiance of a patch against a world-space direction."""
     red, green, blue = outgoing.isotropic[patch, 0], outgoing.isotropic[patch, 1], outgoing.isotropic[patch, 2]
     row = outgoing.lobe[patch] if outgoing.smooth.shape[0] > 0 else -1
@@ -315,7 +318,7 @@ def _along_path(paths, first, last, outgoing, environment, surfaces, peaks):  # 
             if environment.radiance.shape[0] > 0:
                 light = _environment_behind(environment, surfaces.blur[lobe], direction)
         elif patch != NO_PATCH:
-            light = _from_patch(outgoing, patch, direction)
+            light = from_patch(outgoing, patch, direction)
         red += paths.throughput[entry, 0] * light[0]
         green += paths.throughput[entry, 1] * light[1]
         blue += paths.throughput[entry, 2] * light[2]
@@ -339,7 +342,7 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
     is_direct = has_environment and environment.is_direct
     for p in range(start, stop):
         listed.first[p - start] = end
-        point_level, spread = level[min(p, level.shape[0] - 1)], _spread(footprint, p)
+        point_level, spread = level[min(p, level.shape[0] - 1)], spread_of(footprint[min(p, footprint.shape[0] - 1)])
         if not pattern.is_narrow[point_level]:
             continue
         n, t = points.normal[p], points.tangent[p]
@@ -371,7 +374,7 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
                     blue + share * outgoing.isotropic[hit, 2],
                 )
             else:
-                light = _from_patch(outgoing, hit, world)
+                light = from_patch(outgoing, hit, world)
             hx, hy, hz = x + o[0], y + o[1], z + o[2]
             cos_theta_d = _HALF * np.float32(math.sqrt(hx * hx + hy * hy + hz * hz))
             weight = z / max(lobe_density(pattern, point_level, band, cos_theta_d), np.float32(1e-20))

@@ -5,16 +5,19 @@ A polished surface reflects many directions within one pixel where it is curved:
 
 from __future__ import annotations
 
+import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.numba_options import NO_REFCOUNT
+from relume.core.thread_pools import parallel_for_chunks
 from relume.raytrace.surface_points import SurfacePoints
 
 F32 = NDArray[np.float32]
 
-_MIN_NORMAL_COSINE = 0.77  # 40°: larger differences are edges
-_MAX_RISE = 0.5  # distance of a neighbor from the tangent plane, over its distance from the sample
+_MIN_NORMAL_COSINE = np.float32(0.77)  # 40°: larger differences are edges
+_MAX_RISE = np.float32(0.5)  # distance of a neighbor from the tangent plane, over its distance from the sample
 
 
 def pixel_footprint(
@@ -31,28 +34,50 @@ def pixel_footprint(
     pixel = pixel.astype(np.int64)
     first = np.full(int(pixel.max(initial=0)) + width + 2, -1, np.int64)
     first[pixel[::-1]] = np.arange(len(pixel))[::-1]
-    count = np.bincount(pixel, minlength=len(first))
-    out = np.zeros((len(pixel), 2, 2, 3), np.float32)
-    for axis, step in enumerate((1, width)):
-        is_inside = [pixel % width < width - 1, pixel % width > 0] if axis == 0 else [pixel >= 0, pixel >= width]
-        total = np.zeros((len(pixel), 2, 3))
-        num = np.zeros(len(pixel))
-        for sign, inside in zip((1, -1), is_inside, strict=True):
-            neighbor = np.where(inside, first[np.where(inside, pixel + sign * step, 0)], -1)
-            rows = np.flatnonzero(neighbor >= 0)
-            rows = rows[_continues(points, rows, neighbor[rows])]
-            change = [points.normal[neighbor[rows]] - points.normal[rows], wo[neighbor[rows]] - wo[rows]]
-            total[rows] += sign * np.stack(change, axis=1)
-            num[rows] += 1
-        out[:, :, axis] = total / np.maximum(num, 1)[:, None, None]
-    return np.asarray(out / np.sqrt(np.maximum(count[pixel], 1))[:, None, None, None], np.float32)
+    part = (1 / np.sqrt(np.maximum(np.bincount(pixel, minlength=1), 1))).astype(np.float32)
+    out = np.empty((len(pixel), 2, 2, 3), np.float32)
+    args = pixel, first, width, part, points.position, points.normal, wo
+    parallel_for_chunks(lambda start, stop: _fill(*args, start, stop, out), len(pixel))
+    return out
 
 
-def _continues(
-    points: SurfacePoints, rows: NDArray[np.intp], neighbor: NDArray[np.integer]
-) -> Shaped[NDArray[np.bool_], " m"]:
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _fill(pixel, first, width, part, position, normal, wo, start, stop, out):  # type: ignore[no-untyped-def]
+    """Write the footprints of samples [start, stop).
+
+    Args:
+        pixel, width, wo: as in `pixel_footprint`. first: first sample of each pixel, −1 for none.
+        part: side of a sample's part of each pixel. position, normal: of the samples.
+    """
+    for p in range(start, stop):
+        column = pixel[p] % width
+        for axis in range(2):
+            num, scale = 0, part[pixel[p]]
+            for k in range(3):
+                out[p, 0, axis, k] = out[p, 1, axis, k] = 0
+            for sign in (1, -1):
+                other = pixel[p] + (sign if axis == 0 else sign * width)
+                is_outside = (column + sign < 0 or column + sign >= width) if axis == 0 else other < 0
+                q = np.int64(-1) if is_outside else first[other]
+                if q < 0 or not _continues(position[p], normal[p], position[q], normal[q]):
+                    continue
+                num += 1
+                for k in range(3):
+                    out[p, 0, axis, k] += np.float32(sign) * scale * (normal[q, k] - normal[p, k])
+                    out[p, 1, axis, k] += np.float32(sign) * scale * (wo[q, k] - wo[p, k])
+            if num == 2:
+                for k in range(3):
+                    out[p, 0, axis, k] *= np.float32(0.5)
+                    out[p, 1, axis, k] *= np.float32(0.5)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _continues(position, normal, other_position, other_normal):  # type: ignore[no-untyped-def]
     """Return whether a neighbor lies on the same smooth surface as a sample."""
-    normal, offset = points.normal[rows], points.position[neighbor] - points.position[rows]
-    cosine = np.einsum("nc,nc->n", normal, points.normal[neighbor])
-    rise = np.abs(np.einsum("nc,nc->n", normal, offset))
-    return np.asarray((cosine > _MIN_NORMAL_COSINE) & (rise <= _MAX_RISE * np.linalg.norm(offset, axis=1)))
+    cosine = rise = squared = np.float32(0)
+    for k in range(3):
+        offset = other_position[k] - position[k]
+        cosine += normal[k] * other_normal[k]
+        rise += normal[k] * offset
+        squared += offset * offset
+    return cosine > _MIN_NORMAL_COSINE and rise * rise <= _MAX_RISE * _MAX_RISE * squared

@@ -27,10 +27,12 @@ from relume.live.free_camera.highlights.lobe_light_lists import MAX_BRIGHT_LIGHT
 from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
 from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, DirtyRegion, resolve_subset
+from relume.live.free_camera.lobe_terms import TracedLobe, split_terms
 from relume.live.free_camera.normal_mapping import light_gradient
 from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.shade_hard_shadows import add_direct_sharp
+from relume.live.free_camera.shade_lobe_rays import add_lobe_rays
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import ProbeRadiance, shade_probes
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
@@ -40,24 +42,35 @@ from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
 from relume.probes.stored_scene import StoredScene, ViewedProbes
 from relume.scene.model import Camera
+from relume.transport.lobe_scene import LobeScene
 from relume.views.resolve import pack_pixels
 
 F32 = NDArray[np.float32]
 
 
 class ProjectedMaterial(NamedTuple):
-    """The terms of one material, projected to the basis and to lobes."""
+    """The terms of one material, projected to the basis and to lobes.
+
+    Attributes:
+        terms: all of them. traces_lobes: narrow ones are not projected.
+        traced: narrow ones, for lobe rays; None for none.
+    """
 
     terms: Sequence[Mapping[str, Any]]
+    traces_lobes: bool
     tables: Tables
     lobes: Lobes
+    traced: TracedLobe | None
 
 
-def _project_terms(terms: Sequence[Mapping[str, Any]], cached: ProjectedMaterial | None) -> ProjectedMaterial:
-    """Project the terms of a material. cached: its previous projection."""
-    if cached is not None and cached.terms == terms:
+def _project_terms(
+    terms: Sequence[Mapping[str, Any]], cached: ProjectedMaterial | None, traces_lobes: bool
+) -> ProjectedMaterial:
+    """Project the terms of a material. cached: its previous projection. traces_lobes: narrow terms are traced"""
+    if cached is not None and cached.terms == terms and cached.traces_lobes == traces_lobes:
         return cached
-    return ProjectedMaterial(terms, build_tables([terms]), build_lobes([terms]))
+    traced, stored = split_terms(terms) if traces_lobes else (None, terms)
+    return ProjectedMaterial(terms, traces_lobes, build_tables([stored]), build_lobes([stored]), traced)
 
 
 class MaterialState(NamedTuple):
@@ -86,13 +99,14 @@ class MaterialState(NamedTuple):
         normals: Sequence[NormalMap | None] | None = None,
         *,
         is_blocking: bool = True,
+        traces_lobes: bool = False,
     ) -> Self:
         """Project the terms of each material, of a complete look.
 
         Args:
             terms: terms of each. previous: an earlier state, to reuse what has not changed.
             normals: normal-map overrides of each; None: none.
-            is_blocking: see `find_btf_materials`.
+            is_blocking: see `find_btf_materials`. traces_lobes: narrow terms are left to lobe rays.
         """
         normal_maps = [None] * len(terms) if normals is None else normals
         overrides = tuple(
@@ -100,7 +114,7 @@ class MaterialState(NamedTuple):
             for material_terms, item in zip(terms, normal_maps, strict=True)
         )
         cached = previous.projected if previous is not None else [None] * len(terms)
-        projected = [_project_terms(material_terms, item) for material_terms, item in zip(terms, cached, strict=True)]
+        projected = [_project_terms(each, item, traces_lobes) for each, item in zip(terms, cached, strict=True)]
         btf_materials = find_btf_materials(
             terms, previous.btf_materials.available if previous is not None else (), is_blocking=is_blocking
         )
@@ -127,7 +141,7 @@ class FrameRequestState(NamedTuple):
         look: its materials and background are used. light: the illumination.
         gain: gain of the finished image, per channel.
         incident: incident radiance coefficients of that light. is_coarse: they are approximate.
-        texel_light: cached incident light of BTF texels.
+        lobe_scene: that lobe rays meet; None if they are not traced. texel_light: cached incident light of BTF texels.
         is_fine: pixels use two lobes like probes, and highlight edges are antialiased
             (`relume.live.free_camera.highlight_edges`).
     """
@@ -138,6 +152,7 @@ class FrameRequestState(NamedTuple):
     gain: Shaped[F32, " 3"]
     incident: IncidentCoefficients
     is_coarse: bool
+    lobe_scene: LobeScene | None
     texel_light: TexelLight
     is_fine: bool
 
@@ -191,7 +206,7 @@ def render_frame(
         shadow_visibility: shadow visibility of each hard-shadow light along the rays. (rays,) float32 each
     """
     width, height = size
-    final_frame = finish_rays(transfer, state, gbuffer, camera, height, shadow_visibility)
+    final_frame = finish_rays(transfer, state, gbuffer, camera, size, shadow_visibility)
     image = resolve(final_frame.radiance, gbuffer.owner, width * height).reshape(height, width, 3)
     if state.look.background.kind != "transparent":
         return Frame(image, None, final_frame.buffers)
@@ -218,18 +233,20 @@ def finish_rays(
     state: FrameRequestState,
     gbuffer: GBuffer,
     camera: Camera,
-    height: int,
+    size: tuple[int, int],
     shadow_visibility: Sequence[F32] = (),
 ) -> FinalFrame:
     """Return the radiance of rays, with glass and background.
 
     Args:
-        transfer, state, gbuffer, camera, shadow_visibility: as in `render_frame`. height: height of the image, pixels.
+        transfer, state, gbuffer, camera, size, shadow_visibility: as in `render_frame`; rays beyond the pixels of the
+            image are not neighbors.
     """
-    stored_scene, light = transfer.stored_scene, state.light
+    stored_scene, light, height = transfer.stored_scene, state.light, size[1]
     buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
     out = buffers.radiance
     _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, None, out)
+    _add_lobe_rays(transfer, state, gbuffer, camera, size, None, out)
     if (state.gain != 1).any():
         out *= state.gain
     shadow_catcher = _shadow_catcher(transfer, state, gbuffer)
@@ -248,6 +265,7 @@ def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -
     catchers = (material.shadow_catcher for look in (first, second) for material in look.materials.values())
     return (
         before.incident is after.incident
+        and before.lobe_scene is after.lobe_scene
         and [first.normals for first in before.materials.overrides]
         == [first.normals for first in after.materials.overrides]
         and before.light._replace(reflectances=after.light.reflectances) == after.light
@@ -300,9 +318,10 @@ def update_for_materials(
         frame: overwritten. rgb9e5: its packed pixels; overwritten.
         dirty: region that shows the edited materials.
     """
-    height, radiance, rays = len(frame.image), frame.buffers.radiance, dirty.region.rays
+    (height, width, _), radiance, rays = frame.image.shape, frame.buffers.radiance, dirty.region.rays
     _shade(transfer, state, gbuffer, dirty.region, camera, height, frame.buffers)
     _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, rays, radiance)
+    _add_lobe_rays(transfer, state, gbuffer, camera, (width, height), rays, radiance)
     if (state.gain != 1).any():
         radiance[rays] *= state.gain
     resolve_subset(radiance, gbuffer.owner, dirty, frame.image.reshape(-1, 3), rgb9e5)
@@ -411,6 +430,27 @@ def _add_hard_shadow_lights(
         rays,
         out,
     )
+
+
+def _add_lobe_rays(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    rays: NDArray[np.int32] | None,
+    out: F32,
+) -> None:
+    """Add the reflections of narrow lobes along some rays, None for all. out: added to. (rays, 3)"""
+    if state.lobe_scene is None:
+        return
+    lobes = [material.traced for material in state.materials.projected]
+    environment = _prefiltered_environment(transfer, state.light)
+    gain = state.light.environment_gain if state.light.has_environment else (0.0, 0.0, 0.0)
+    environment = environment._replace(gain=np.array(gain, np.float32))
+    stored_scene = transfer.stored_scene_with(state.materials.overrides)
+    scene_args = transfer, stored_scene, state.lobe_scene, lobes, state.light, environment
+    add_lobe_rays(*scene_args, gbuffer, camera, size, rays, out)
 
 
 def _node_light_gradient(stored_scene: StoredScene, incident: IncidentCoefficients, gbuffer: GBuffer) -> F32:

@@ -33,6 +33,7 @@ from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlight_edges import render_fine_frame
 from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, find_dirty_pixels
+from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.occluded_probes import reweight
 from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
 from relume.live.free_camera.probe_light import LightRequest, ProbeLightState
@@ -43,6 +44,7 @@ from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
 from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
+from relume.transport.lobe_scene import LobeScene
 from relume.views.resolve import encode_coverage, encode_pixels
 
 F32 = NDArray[np.float32]
@@ -82,6 +84,8 @@ class FreeCameraPicture:
         self._residual_image: F32 | None = None  # residual that is added to the frame
         self._is_refined = False  # a job has refined the frame since the last step
         self.renders_pixels = True
+        self._lobe_scene: tuple[Illumination, LobeScene] | None = None  # of the latest light that it is known for
+        self._narrow_look: tuple[Look | None, bool] = None, False  # whether the look has narrow terms
         self._published_vectors: IncidentCoefficients | None = None
         self._vectors_version = self._materials_version = 0
 
@@ -150,7 +154,13 @@ class FreeCameraPicture:
             return self._probe_light.next_job(self._light_request(), self._needed_probes)
         if self._look is not None and (missing := self._material_state(self._look).btf_materials.missing):
             return self._tables_job(missing[0].data, missing[0].components)
-        return self._refine_job() if self._is_watched and self.renders_pixels else None
+        if not (self._is_watched and self.renders_pixels):
+            return None
+        if self._look is not None and self._has_narrow_lobes(self._look):
+            light = self._current_light()
+            if self._lobe_scene is None or self._lobe_scene[0] != light:
+                return self._lobe_job(light)
+        return self._refine_job()
 
     def _tables_job(self, data: str, components: int) -> Job:
         """Return the job for the tables of a BTF, seconds for 128 × 128 texels; until then its mean is displayed."""
@@ -316,6 +326,7 @@ class FreeCameraPicture:
             gain,
             incident,
             is_coarse,
+            self._current_lobe_scene(),
             self._texel_light,
             is_fine,
         )
@@ -378,11 +389,48 @@ class FreeCameraPicture:
             names = self._transfer.material_names
             normals = [look.materials[name].normals for name in names]
             terms = [material_documents(look, name) for name in names]
-            materials = MaterialState.from_terms(terms, previous, normals, is_blocking=not self._is_watched)
+            materials = MaterialState.from_terms(
+                terms,
+                previous,
+                normals,
+                is_blocking=not self._is_watched,
+                traces_lobes=self._current_lobe_scene() is not None,
+            )
             self._materials_version += materials is not previous
             self._materials = look, materials
             return materials
         return previous
+
+    def _has_narrow_lobes(self, look: Look) -> bool:
+        """Return whether a material of a look has terms for lobe rays."""
+        if self._narrow_look[0] is not look:
+            documents = (material_documents(look, name) for name in self._transfer.material_names)
+            self._narrow_look = look, any(split_terms(terms)[0] is not None for terms in documents)
+        return self._narrow_look[1]
+
+    def _current_lobe_scene(self) -> LobeScene | None:
+        """Return what lobe rays meet, in the latest light that it is known for; None if they are not traced."""
+        light = self._current_light()
+        assert self._look is not None
+        if not self.renders_pixels or not self._has_narrow_lobes(self._look):
+            return None
+        if not self._is_watched and (self._lobe_scene is None or self._lobe_scene[0] != light):
+            self._lobe_scene = light, self._transfer.lobe_scene(light, lambda: False)
+        return None if self._lobe_scene is None else self._lobe_scene[1]
+
+    def _lobe_job(self, light: Illumination) -> Job:
+        """Return the job for the light that lobe rays meet; until then rays meet that of the previous look."""
+
+        def display(scene: LobeScene) -> None:
+            self._lobe_scene, self._materials, self._displayed = (light, scene), (None, self._materials[1]), None
+
+        return Job(
+            ("lobe rays", self._transfer.key, light),
+            "light in reflections",
+            Priority.REFINEMENT,
+            lambda progress, is_canceled: self._transfer.lobe_scene(light, is_canceled),
+            display,
+        )
 
     def _current_vectors(self, is_needed: NDArray[np.uint8]) -> IncidentCoefficients:
         """Incident coefficients of the look's light; approximate ones only for needed probes."""

@@ -89,7 +89,7 @@ def add_samples(
     owner = np.repeat(pixels, _RAYS_PER_PIXEL)
     owner = np.concatenate([owner, owner[extra_gbuffer.glass.ray]])
     final_frame = finish_rays(
-        transfer, state, extra_gbuffer, camera, height, [fractions[owner] for fractions in shadow_visibility]
+        transfer, state, extra_gbuffer, camera, (0, height), [fractions[owner] for fractions in shadow_visibility]
     )
     image, coverage = frame.image.copy(), frame.coverage
     image.reshape(-1, 3)[pixels] = final_frame.radiance.reshape(-1, _RAYS_PER_PIXEL, 3).mean(axis=1)

@@ -57,6 +57,11 @@ class GBuffer(NamedTuple):
             _NO_VECTORS),
         )  # fmt: skip
 
+    def pixel_of_ray(self, num_pixels: int) -> Shaped[NDArray[np.intp], " n"]:
+        """Return the pixel of each ray. num_pixels: number of pixels of the image"""
+        pixel = np.concatenate([np.arange(num_pixels), self.owner])
+        return np.concatenate([pixel, pixel[self.glass.ray]])
+
     def first_hit_row(self, pixel: int) -> int:
         """Return the row of the first hit at a pixel center, glass included."""
         glass_rays = self.glass.ray

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import OpenBake
 from relume.live.free_camera.environment_lookup import EnvironmentLookup
 from relume.live.free_camera.free_view import FreeView
@@ -21,6 +22,9 @@ from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import EnvironmentKey
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.surface_points import SurfacePoints
+from relume.transport.lobe_scene import LobeScene
+from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
 
@@ -124,6 +128,20 @@ class FreeCameraTransfer(OpenBake, Protocol):
         Args:
             light: direct light. is_preview: fast, for an environment that was not baked.
         """
+        ...
+
+    def lobe_scene(self, light: Illumination, is_canceled: CancelCheck) -> LobeScene:
+        """Return the surfaces that lobe rays meet, with their light; slow if that light is not cached.
+
+        Args:
+            light: the illumination. is_canceled: polled.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
+        ...
+
+    def lobe_local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights to points, few for each light. light: the illumination"""
         ...
 
     def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:

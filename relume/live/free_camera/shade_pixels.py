@@ -173,7 +173,7 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _perturbed_normal(  # type: ignore[no-untyped-def]
+def perturbed_normal(  # type: ignore[no-untyped-def]
     textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
 ):
     """Apply the normal map to the normal n of a pixel. outward: outward of the face. is_back_face: the ray hits its
@@ -226,7 +226,7 @@ def _shade_pixels(scene, pixel_angle, gbuffer, probes, emission, mirror_data, ro
         if lobe >= 0:
             gradient_term = _gradient_term(mirror_data.gradients, nodes, weights, d, n)
         if is_mapped:
-            perturbed = _perturbed_normal(
+            perturbed = perturbed_normal(
                 textures, textures.material_textures[material, NORMAL_MAP], texture_uv, footprint, tangents, corners,
                 barycentric,
                 n, outward, view_cosine > 0, texture_value,

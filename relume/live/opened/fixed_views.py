@@ -32,9 +32,10 @@ from relume.live.opened.lobe_light import (
     LobeTracer,
     choose_peaks,
     lobe_environment,
+    narrow_surfaces,
     only_broad,
-    reflects_narrowly,
     tile_of_texels,
+    trace_lobes,
 )
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.live.opened.retrace import NormalRetracer
@@ -46,6 +47,7 @@ from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
 from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
+from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
@@ -254,17 +256,25 @@ class BakedFixedViews:
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
         pattern = self._lobe_tracer.pattern(lobe)
-        reflectances = light.reflectances if light.paths.has_all_bounces else ()
-        narrow = tuple(reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances)
-        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
-        tint, share = self._lobe_patches(reflectances)
-        footprint = samples.pixel_footprint(receivers)
-        surfaces = self._lobe_tracer.surfaces(reflectances if any(narrow) else (), tint)
-        trace_args = receivers, footprint, pattern, surfaces, is_canceled
-        hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(*trace_args))
+        narrow = narrow_surfaces(_reflecting(light))
+        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow))
+        footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled)
+        hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
         environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
-        light_args = self._patch_light(light, is_canceled), environment, share
-        return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks)
+        light_args = scene.outgoing, environment, scene.broad_share
+        return LobeRays(hits, pattern, *light_args, footprint, scene.surfaces, peaks)
+
+    def lobe_scene(self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False) -> LobeScene:
+        """Return the surfaces that lobe rays meet, with their light.
+
+        Args:
+            light: the illumination. is_canceled: polled.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
+        reflectances = _reflecting(light)
+        tint, share = self._lobe_patches(reflectances)
+        return self._lobe_tracer.scene(reflectances, tint, share, self._patch_light(light, is_canceled))
 
     def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
         """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
@@ -451,6 +461,11 @@ class SelectedSamples:
     def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
         """Return the rays of local lights; shadows are traced."""
         return self.local.rays_to(light, points)
+
+
+def _reflecting(light: Illumination) -> Reflectances:
+    """Return the reflectances of the surfaces that lobe rays go on from; none if not all bounces are shown."""
+    return light.reflectances if light.paths.has_all_bounces else ()
 
 
 def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:

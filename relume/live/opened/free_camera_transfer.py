@@ -15,6 +15,7 @@ from relume.core.cache import Cache
 from relume.core.jackknife import JackknifeEstimate
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment
+from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality
 from relume.live.free_camera.environment_lookup import EnvironmentLookup
 from relume.live.free_camera.free_view import FreeView
@@ -42,8 +43,9 @@ from relume.store.bake_protocol import StoreReader
 from relume.transport.clustered_rays import shared_direction_coefficients, weighted_basis
 from relume.transport.direction_bins import DirectionBins, outgoing_bins
 from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
+from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
-from relume.transport.shading_points import GatherRays, RayList
+from relume.transport.shading_points import GatherRays, LocalRays, RayList
 from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
@@ -372,6 +374,14 @@ class BakedFreeCamera:
     def prefiltered(self, name: str | None) -> EnvironmentLookup:
         """Return an environment (None: the scene's own), and its blurred versions without bright lights."""
         return self._prefiltered.environment_lookup(name)
+
+    def lobe_scene(self, light: Illumination, is_canceled: CancelCheck = lambda: False) -> LobeScene:
+        """Return the surfaces that lobe rays meet, with their light. See `FreeCameraTransfer`."""
+        return self.light_transport.lobe_scene(light, is_canceled)
+
+    def lobe_local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
+        """Return the rays of local lights to points, few for each light. light: the illumination"""
+        return self.light_transport.local.rays_to(light, points, is_coarse=True)
 
     def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
         """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""

@@ -30,6 +30,8 @@ from relume.store.bake_protocol import StoreReader
 from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
 from relume.transport.lobe_paths import LobeSurfaces
 from relume.transport.lobe_rays import LobeEnvironment
+from relume.transport.lobe_scene import LobeScene
+from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.patch_lookup import PatchLookup, patch_reach
 from relume.transport.shading_points import GatherRays, ShadingPoints
 
@@ -58,30 +60,24 @@ class LobeTracer:
         num_rays = _NARROW_RAYS if lobe.median.max() < _WIDE else _LOBE_RAYS
         return make_lobe_pattern(lobe, num_rays, int(self._store.attributes.get("gather_seed", 0)))
 
-    def trace(
+    def scene(
         self,
-        receivers: ShadingPoints,
-        footprint: Shaped[F32, "#n 2 2 3"],
-        pattern: LobePattern,
-        surfaces: LobeSurfaces,
-        is_canceled: Callable[[], bool],
-    ) -> LobeHits:
-        """Trace the rays of points. See `trace_lobe_rays`.
-
-        Args:
-            receivers: the points. footprint: of each in its pixel. pattern: their rays.
-            surfaces: that rays go on from. is_canceled: polled.
-        """
-        points_args = receivers.points, receivers.wo, footprint, receivers.level
-        return trace_lobe_rays(self._tracer.geometry, self._lookup, surfaces, *points_args, pattern, is_canceled)
-
-    def surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"]) -> LobeSurfaces:
-        """Return the surfaces that rays go on from: those with narrow lobes.
+        reflectances: Reflectances,
+        tint: Shaped[F32, "patches 3"],
+        broad_share: Shaped[F32, " patches"],
+        outgoing: OutgoingLight,
+    ) -> LobeScene:
+        """Return the surfaces that lobe rays meet. See `LobeScene`.
 
         Args:
             reflectances: of all materials. Empty: rays end at the first surface.
-            tint: mean of the specular texture of each patch.
+            tint: mean of the specular texture of each patch. broad_share, outgoing: as in `LobeScene`.
         """
+        surfaces = self._surfaces(reflectances if any(narrow_surfaces(reflectances)) else (), tint)
+        return LobeScene(self._tracer.geometry, self._lookup, surfaces, outgoing, broad_share)
+
+    def _surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"]) -> LobeSurfaces:
+        """Return the surfaces that rays go on from: those with narrow lobes."""
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
         materials = [index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]
         found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
@@ -156,6 +152,29 @@ def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -
     is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
     gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
     return replace(rays, gather_hits=gather_hits)
+
+
+def trace_lobes(
+    scene: LobeScene,
+    receivers: ShadingPoints,
+    footprint: Shaped[F32, "#n 2 2 3"],
+    pattern: LobePattern,
+    is_canceled: Callable[[], bool],
+) -> LobeHits:
+    """Trace the lobe rays of points. See `trace_lobe_rays`.
+
+    Args:
+        scene: that is met. receivers: the points. footprint: of each in its pixel. pattern: their rays.
+        is_canceled: polled.
+    """
+    points_args = receivers.points, receivers.wo, footprint, receivers.level
+    return trace_lobe_rays(scene.geometry, scene.lookup, scene.surfaces, *points_args, pattern, is_canceled)
+
+
+def narrow_surfaces(reflectances: Reflectances) -> tuple[str, ...]:
+    """Return the digest of each reflectance from which lobe rays go on, empty for others; () if there is none."""
+    digests = tuple(each.digest if reflects_narrowly(each) else "" for each in reflectances)
+    return digests if any(digests) else ()
 
 
 def reflects_narrowly(reflectance: Reflectance) -> bool:

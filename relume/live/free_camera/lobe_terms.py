@@ -1,0 +1,56 @@
+"""Terms whose lobes are ray traced for each pixel: lobes narrower than what probes store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.brdf.albedo import directional_albedo
+from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
+from relume.brdf.roughness_levels import NO_LEVELS
+from relume.brdf.texture_slots import texture_slot
+from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS, cosines
+
+F32 = NDArray[np.float32]
+Terms = Sequence[Mapping[str, Any]]
+
+
+class TracedLobe(NamedTuple):
+    """The narrow terms of a material.
+
+    Attributes:
+        sampling: distribution of rays, of the first of them. core: of its inner half.
+        albedo: directional albedo over θo, by groups of terms as in `relume.live.free_camera.shade_probes`.
+    """
+
+    sampling: LobeSampling
+    core: LobeSampling
+    albedo: Shaped[F32, "rows groups 3"]
+
+
+def split_terms(terms: Terms) -> tuple[TracedLobe | None, Terms]:
+    """Split the terms of a material into narrow ones, None for none, and the others. terms: of a complete look"""
+    samplings = [sample_lobe(term, NO_LEVELS) for term in terms]
+    narrow = [term for term, sampling in zip(terms, samplings, strict=True) if sampling is not None]
+    if not narrow:
+        return None, terms
+    albedo = np.zeros((NUM_ROWS, NUM_GROUPS, 3), np.float32)
+    for group in {texture_slot(term) for term in narrow}:
+        theta_o, values = directional_albedo([term for term in narrow if texture_slot(term) == group])
+        for channel in range(3):
+            albedo[:, group, channel] = np.interp(np.arccos(cosines()), theta_o, values[:, channel])
+    others = [term for term, sampling in zip(terms, samplings, strict=True) if sampling is None]
+    sampling = next(sampling for sampling in samplings if sampling is not None)
+    return TracedLobe(sampling, _inner_half(sampling), albedo), others
+
+
+def _inner_half(sampling: LobeSampling) -> LobeSampling:
+    """Return the distribution of the half of all rays that is nearest to the peak."""
+    fraction = np.linspace(0, 1, sampling.quantile.shape[1])
+    quantile = [np.interp(0.5 * fraction, fraction, row) for row in sampling.quantile]
+    return sampling._replace(quantile=np.array(quantile, np.float32))

@@ -1,0 +1,232 @@
+"""Shading by lobe rays: narrow terms of pixels, whose light is ray traced while the camera moves.
+
+    B = a(θo) · texture · L̄ ,
+
+L̄ from `relume.live.free_camera.lobe_radiance`, shared among neighboring pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numba as nb
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.core.thread_pools import parallel_for_chunks
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
+from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
+from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.lobe_radiance import (
+    add_direct_lights,
+    lobe_widths,
+    mean_lobe_radiance,
+    share_with_neighbors,
+)
+from relume.live.free_camera.lobe_terms import TracedLobe
+from relume.live.free_camera.normal_mapping import normalize
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.live.free_camera.shade_pixels import blend, interpolate_uv, perturbed_normal, texture_footprint
+from relume.live.free_camera.texture_kernels import sample_texture
+from relume.probes.stored_scene import NORMAL_MAP, StoredScene
+from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
+from relume.raytrace.surface_points import SurfacePoints
+from relume.scene.model import Camera
+from relume.transport.lobe_scene import LobeScene
+from relume.transport.patch_lookup import tangents_of
+from relume.transport.shading_points import ShadingPoints
+from relume.views.pixel_footprint import pixel_footprint
+
+F32 = NDArray[np.float32]
+I32 = NDArray[np.int32]
+
+_MAX_RAYS = 60_000  # of a frame, for 15 frames a second on two cores
+_MOST_RAYS = 8  # of a pixel
+_STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads pixels evenly
+_SEED = 1
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _find_points(scene, gbuffer, camera_position, offset, pixel_angle, rows, start, stop, points, wo):  # type: ignore[no-untyped-def]
+    """Write the points of rays rows[start:stop], with mapped normals.
+
+    Args:
+        scene: `PixelArrays`. gbuffer: `GBuffer`. camera_position: meters. offset: of origins from surfaces, meters.
+        pixel_angle: angle of a pixel, radians. points: `SurfacePoints`, written. wo: written. (n, 3)
+    """
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene
+    (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
+    scratch = np.empty(3, np.float32)
+    for i in range(start, stop):
+        p = rows[i]
+        f, d = face[p], (directions[p, 0], directions[p, 1], directions[p, 2])
+        nodes = lattice_node[p, 0], lattice_node[p, 1], lattice_node[p, 2]
+        weights, outward = (
+            (weight[p, 0], weight[p, 1], weight[p, 2]),
+            (face_normal[f, 0], face_normal[f, 1], face_normal[f, 2]),
+        )
+        n, view_cosine = (
+            normalize(blend(normals, nodes, weights)),
+            outward[0] * d[0] + outward[1] * d[1] + outward[2] * d[2],
+        )
+        image = textures.material_textures[face_material[f], NORMAL_MAP]
+        if image >= 0:
+            footprint = texture_footprint(distance[p], pixel_angle, uv_scale[f], view_cosine)
+            texture_uv = interpolate_uv(uvs, (uv_faces[f, 0], uv_faces[f, 1], uv_faces[f, 2]), (uv[p, 0], uv[p, 1]))
+            n = perturbed_normal(
+                textures, image, texture_uv, footprint, tangents, (faces[f, 0], faces[f, 1], faces[f, 2]),
+                (uv[p, 0], uv[p, 1]), n, outward, view_cosine > 0, scratch,
+            )  # fmt: skip
+        t, _ = tangents_of(n)
+        lift = -offset if view_cosine > 0 else offset
+        for axis in range(3):
+            points.position[i, axis] = camera_position[axis] + distance[p] * d[axis] + lift * outward[axis]
+            points.normal[i, axis], points.tangent[i, axis], wo[i, axis] = n[axis], t[axis], -d[axis]
+        points.seed[i] = p
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_lobes(scene, gbuffer, pixel_angle, albedo, points, wo, radiance, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Add the radiance of lobes to rays rows[start:stop].
+
+    Args:
+        scene, gbuffer, pixel_angle: as in `_find_points`. albedo: of `TracedLobe`.
+        points, wo: of each ray. radiance: L̄ of each. out: added to. (rays, 3)
+    """
+    textures, uvs, _, _, uv_faces, face_material, face_normal, uv_scale, _ = scene
+    (face, uv, distance), directions, _, _, _, _, _, _ = gbuffer
+    texture_value = np.empty(3, np.float32)
+    for i in range(start, stop):
+        p = rows[i]
+        f, n = face[p], points.normal[i]
+        cosine = n[0] * wo[i, 0] + n[1] * wo[i, 1] + n[2] * wo[i, 2]
+        row, fraction = table_row(min(max(cosine, MIN_COSINE), np.float32(1)))
+        for group in range(NUM_GROUPS):
+            texture_value[0] = texture_value[1] = texture_value[2] = 1
+            image = textures.material_textures[face_material[f], group - 1] if group else -1
+            if image >= 0:
+                view_cosine = (
+                    face_normal[f, 0] * directions[p, 0]
+                    + face_normal[f, 1] * directions[p, 1]
+                    + face_normal[f, 2] * directions[p, 2]
+                )
+                footprint = texture_footprint(distance[p], pixel_angle, uv_scale[f], view_cosine)
+                u, v = interpolate_uv(uvs, (uv_faces[f, 0], uv_faces[f, 1], uv_faces[f, 2]), (uv[p, 0], uv[p, 1]))
+                sample_texture(textures, image, u, v, footprint, texture_value)
+            for channel in range(3):
+                lower, upper = albedo[row, group, channel], albedo[row + 1, group, channel]
+                out[p, channel] += texture_value[channel] * (lower + fraction * (upper - lower)) * radiance[i, channel]
+
+
+def add_lobe_rays(
+    transfer: FreeCameraTransfer,
+    stored_scene: StoredScene,
+    lobe_scene: LobeScene,
+    lobes: Sequence[TracedLobe | None],
+    light: Illumination,
+    environment: PrefilteredEnvironment,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    rays: Shaped[I32, " n"] | None,
+    out: Shaped[F32, "rays 3"],
+) -> None:
+    """Add the reflections of narrow lobes along camera rays.
+
+    Args:
+        transfer: of the bake. stored_scene: that is hit, with map overrides. lobe_scene: that lobe rays meet.
+        lobes: of each material. light: the illumination. environment: with the gain of all its light.
+        gbuffer: G-buffer of the rays. camera: of the image. size: of the image, pixels.
+        rays: the rays to shade; None: all. out: radiance, added to.
+    """
+    face = gbuffer.hits.face if rays is None else gbuffer.hits.face[rays]
+    material = np.where(face >= 0, stored_scene.face_material[np.maximum(face, 0)], -1)
+    has_weight = gbuffer.weight.any(axis=1) if rays is None else gbuffer.weight[rays].any(axis=1)
+    chosen = {k: np.flatnonzero((material == k) & has_weight) for k, lobe in enumerate(lobes) if lobe is not None}
+    num_points = sum(map(len, chosen.values()))
+    scene_args = transfer, stored_scene, lobe_scene, light, environment, gbuffer, camera, size
+    for k, index in chosen.items():
+        if len(index):
+            rows = (index if rays is None else rays[index]).astype(np.int32)
+            _add_lobe(*scene_args, lobes[k], _MAX_RAYS / num_points, rows, out)
+
+
+def _add_lobe(
+    transfer: FreeCameraTransfer,
+    stored_scene: StoredScene,
+    lobe_scene: LobeScene,
+    light: Illumination,
+    environment: PrefilteredEnvironment,
+    gbuffer: GBuffer,
+    camera: Camera,
+    size: tuple[int, int],
+    lobe: TracedLobe | None,
+    rays_per_point: float,
+    rows: I32,
+    out: F32,
+) -> None:
+    """Add the reflections of one material.
+
+    Args:
+        transfer, stored_scene, lobe_scene, light, environment, gbuffer, camera, size, out: of `add_lobe_rays`.
+        lobe: of the material. rays_per_point: mean number that time allows. rows: rays that hit it, ascending.
+    """
+    assert lobe is not None
+    scene_args = stored_scene.pixel_arrays(), gbuffer
+    position, pixel_angle = camera.to_world[:3, 3].astype(np.float32), np.float32(camera.yfov / size[1])
+    wo, *frame = (np.empty((len(rows), 3), np.float32) for _ in range(4))
+    points = SurfacePoints(*frame, np.empty(len(rows), np.uint32))
+    point_args = *scene_args, position, np.float32(lobe_scene.surfaces.offset), pixel_angle, rows
+    parallel_for_chunks(lambda start, stop: _find_points(*point_args, start, stop, points, wo), len(rows))
+    receivers = ShadingPoints(points, wo, np.empty((len(rows), 0), np.uint8))
+    num_centers = int(np.searchsorted(rows, size[0] * size[1]))
+    footprint = np.zeros((len(rows), 2, 2, 3), np.float32)
+    centers = slice(0, num_centers)
+    footprint[centers] = pixel_footprint(rows[centers], size[0], points.rows(centers), wo[centers])
+    core, pattern = (
+        make_lobe_pattern(sampling, int(np.clip(rays_per_point, 1, _MOST_RAYS)), _SEED)
+        for sampling in (lobe.core, lobe.sampling)
+    )
+    light_args = lobe_scene, environment, receivers, footprint
+    core_args = core, lobe_widths(pattern)[0], rows, gbuffer, size, rays_per_point
+    radiance = _trace_some(*light_args, *core_args, is_direct=light.paths.direct)
+    if light.paths.direct:
+        add_direct_lights(*light_args, pattern, transfer.lobe_local_rays(light, points), radiance)
+    args = *scene_args, pixel_angle, lobe.albedo, points, wo, radiance, rows
+    parallel_for_chunks(lambda start, stop: _add_lobes(*args, start, stop, out), len(rows))
+
+
+def _trace_some(
+    lobe_scene: LobeScene,
+    environment: PrefilteredEnvironment,
+    receivers: ShadingPoints,
+    footprint: F32,
+    core: LobePattern,
+    lobe_width: np.float32,
+    rows: I32,
+    gbuffer: GBuffer,
+    size: tuple[int, int],
+    rays_per_point: float,
+    *,
+    is_direct: bool,
+) -> F32:
+    """Trace rays of some pixel centers, and share them among all rays of all pixels. (n, 3)
+
+    Args:
+        lobe_scene, environment, receivers, footprint, core, lobe_width, is_direct: of `mean_lobe_radiance`.
+        rows, gbuffer, size, rays_per_point: of `_add_lobe`.
+    """
+    (width, height), radiance = size, np.zeros((len(rows), 3), np.float32)
+    is_traced = rows < width * height
+    if not is_traced.any():  # rays of no image
+        return mean_lobe_radiance(lobe_scene, environment, receivers, footprint, core, lobe_width, is_direct=is_direct)
+    y, x = np.divmod(rows, width)
+    is_traced &= (x * _STEP_X + y * _STEP_Y) % 1.0 < rays_per_point
+    traced = np.flatnonzero(is_traced)
+    traced_args = receivers.without_light(traced), footprint[traced], core, lobe_width
+    radiance[traced] = mean_lobe_radiance(lobe_scene, environment, *traced_args, is_direct=is_direct)
+    share_args = is_traced, gbuffer.pixel_of_ray(width * height)[rows], size, receivers, footprint, lobe_width
+    return share_with_neighbors(radiance, *share_args)
