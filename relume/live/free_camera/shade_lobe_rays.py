@@ -177,8 +177,8 @@ def _add_lobe(
     assert lobe is not None
     scene_args = stored_scene.pixel_arrays(), gbuffer
     position, pixel_angle = camera.to_world[:3, 3].astype(np.float32), np.float32(camera.yfov / size[1])
-    wo, *frame = (np.empty((len(rows), 3), np.float32) for _ in range(4))
-    points = SurfacePoints(*frame, np.empty(len(rows), np.uint32))
+    wo, origins, normals, tangents = np.empty((4, len(rows), 3), np.float32)
+    points = SurfacePoints(origins, normals, tangents, np.empty(len(rows), np.uint32))
     point_args = *scene_args, position, np.float32(lobe_scene.surfaces.offset), pixel_angle, rows
     parallel_for_chunks(lambda start, stop: _find_points(*point_args, start, stop, points, wo), len(rows))
     receivers = ShadingPoints(points, wo, np.empty((len(rows), 0), np.uint8))
@@ -191,8 +191,8 @@ def _add_lobe(
         for sampling in (lobe.core, lobe.sampling)
     )
     light_args = lobe_scene, environment, receivers, footprint
-    core_args = core, lobe_widths(pattern)[0], rows, gbuffer, size, rays_per_point
-    radiance = _trace_some(*light_args, *core_args, is_direct=light.paths.direct)
+    width, is_direct = lobe_widths(pattern)[0], light.paths.direct
+    radiance = _trace_some(*light_args, core, width, rows, gbuffer, size, rays_per_point, is_direct=is_direct)
     if light.paths.direct:
         add_direct_lights(*light_args, pattern, transfer.lobe_local_rays(light, points), radiance)
     args = *scene_args, pixel_angle, lobe.albedo, points, wo, radiance, rows

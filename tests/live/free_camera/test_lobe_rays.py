@@ -1,0 +1,113 @@
+"""Polished surfaces while a camera moves, against exact views of the same camera and closed forms."""
+
+import copy
+
+import numpy as np
+import pytest
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
+
+from relume.brdf.albedo import directional_albedo
+from relume.core.cache import Cache
+from relume.live.free_camera.lobe_terms import split_terms
+from relume.live.opened.openers import open_bake
+from relume.live.opened.static_view import StaticViewBuilder
+from relume.look import complete, validate
+from relume.methods.registry import METHODS
+from relume.output.render_image import render_image
+from relume.scene.model import Material
+from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
+
+CAMERA = make_camera("front", [0.4, 1.2, 3.2], [0, 0.45, 0], 0.7)
+SIZE = (48, 36)
+CHROME = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.05, "f0": 0.9}}
+RED = {"model": "lambert", "color": [0.8, 0.1, 0.1]}
+
+
+def bake_ball(folder, environment):
+    ball = sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24)
+    floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 1)
+    materials = [Material("Ball", (CHROME,)), Material("Floor", (RED,))]
+    scene = make_tiny_scene(ball, floor, camera=CAMERA, environment=environment, materials=materials)
+    recipe = Recipe("probes", ("front",), SIZE, 200, num_probes=3000)
+    bake = open_bake(bake_in_process(METHODS["probes"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
+    return bake, StaticViewBuilder(bake.light_transport, scene)
+
+
+@pytest.fixture(scope="module")
+def white(tmp_path_factory):
+    return bake_ball(tmp_path_factory.mktemp("white"), np.ones((16, 32, 3), np.float32))
+
+
+@pytest.fixture(scope="module")
+def sunny(tmp_path_factory):
+    radiance = np.full((64, 128, 3), 0.3, np.float32)
+    radiance[20:22, 40:42] = 300
+    return bake_ball(tmp_path_factory.mktemp("sunny"), radiance)
+
+
+def look_with(bake, edit):
+    document = copy.deepcopy(complete({}, bake.default_look))
+    edit(document)
+    return validate(document, bake.default_look)
+
+
+def show(bake, look, builder=None, finer=1):
+    camera_and_size = CAMERA, (finer * SIZE[0], finer * SIZE[1])
+    image = render_image(bake, "front", look, static_views=builder, camera_and_size=camera_and_size)
+    return np.asarray(image[..., :3])
+
+
+def ball_of(bake, look):
+    """Pixels of the ball alone: what changes with its color."""
+
+    def darken(document):
+        document["materials"]["Ball"]["terms"][0]["color"] = [0.0] * 3
+
+    return (show(bake, look) - show(bake, look_with(bake, darken))).max(axis=2) > 0.05
+
+
+def test_narrow_terms_leave_the_basis():
+    rough = {**CHROME, "params": {"roughness": 0.4, "f0": 0.9}}
+    traced, others = split_terms([RED, CHROME, rough])
+    assert others == [RED, rough]
+    theta_o, values = directional_albedo([CHROME])
+    np.testing.assert_allclose(traced.albedo[0, 0], np.interp(0, theta_o, values[:, 0]), rtol=1e-3)
+    assert split_terms([RED, rough]) == (None, [RED, rough])
+    assert (traced.core.quantile[0, -1] == traced.sampling.quantile[0, 2048]).all()
+
+
+def test_a_chrome_ball_shows_the_floor_as_the_exact_view_does(white):
+    bake, builder = white
+    look = look_with(bake, lambda document: None)
+    moving, exact, is_ball = show(bake, look), show(bake, look, builder), ball_of(bake, look)
+    assert is_ball.sum() > 100
+    assert abs(moving[is_ball].mean() / exact[is_ball].mean() - 1) < 0.03
+    assert np.sqrt(np.mean((moving - exact)[is_ball] ** 2)) < 0.1 * np.sqrt(np.mean(exact[is_ball] ** 2))
+    # the floor is in its lower half, red
+    lower = is_ball & (np.arange(SIZE[1]) > 24)[:, None]
+    assert moving[lower, 0].mean() > 2 * moving[lower, 1].mean()
+
+
+def test_direct_light_alone_leaves_the_floor_out(white):
+    bake, builder = white
+    look = look_with(bake, lambda document: document["transport"].update(show="direct"))
+    moving, exact, is_ball = show(bake, look), show(bake, look, builder), ball_of(bake, look)
+    assert np.sqrt(np.mean((moving - exact)[is_ball] ** 2)) < 0.1 * np.sqrt(np.mean(exact[is_ball] ** 2))
+
+
+@pytest.mark.parametrize("roughness", [0.01, 0.05, 0.2])
+def test_the_highlight_of_a_sun_has_its_energy(sunny, roughness):
+    bake, builder = sunny
+
+    def edit(document):
+        document["materials"]["Ball"]["terms"][0]["params"]["roughness"] = roughness
+
+    look = look_with(bake, edit)
+    moving, exact = show(bake, look, finer=4), show(bake, look, builder, finer=4)
+    assert np.isfinite(moving).all()
+    assert (moving >= 0).all()
+    assert exact.max() > 3
+    sun = exact - np.minimum(exact, 1)
+    assert sun.mean() > 0.02 * exact.mean()
+    assert abs(moving.mean() / exact.mean() - 1) < 0.03
