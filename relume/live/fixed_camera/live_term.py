@@ -209,9 +209,9 @@ class LiveTerm:
         limit = Fidelity.NEAR_EXACT if self._lacks_lobe(displayed) else Fidelity.EXACT
         return min(displayed.fidelity, limit if is_current else Fidelity.APPROXIMATE)
 
-    def operator_key(self, basis: EditBasis, bands: Mapping[str, F64]) -> tuple[Hashable, ...]:
+    def operator_key(self, basis: EditBasis, bands: Mapping[str, F64], light: Illumination) -> tuple[Hashable, ...]:
         """Dependencies of an operator besides view and material: model, light, and its fixed curves."""
-        return ((self.model, self.light), basis, *_rows(bands, basis.affected_curves))
+        return ((self.model, light), basis, *_rows(bands, basis.affected_curves))
 
     def image_key(self, light: Illumination) -> tuple[Hashable, ...]:
         """Dependencies of the target's image in some light besides view and material."""

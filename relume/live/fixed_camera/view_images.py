@@ -16,6 +16,7 @@ from relume.brdf.term_validation import complete_term
 from relume.brdf.texture_slots import roughness_image
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
+from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import (
@@ -258,18 +259,19 @@ class ViewImages:
         basis: EditBasis,
         bands: Mapping[str, F64],
         *,
+        light: Illumination | None = None,
         is_merged_light: bool = False,
     ) -> tuple[Hashable, ...]:
         """Cache key of the operator of `live`, a term of `material`, along a basis.
 
         Args:
             bands: bands of the term's curves, (3, J) each; those of the basis are free.
-            is_merged_light: it is from merged
-                lights.
+            light: the illumination; None: the target's.
+            is_merged_light: it is from merged lights.
         """
         return (
             *self._sample_key(material),
-            live.operator_key(basis, bands),
+            live.operator_key(basis, bands, live.light if light is None else light),
             *((MERGED_LIGHT_SUFFIX,) if is_merged_light else ()),
         )
 
@@ -286,12 +288,18 @@ class ViewImages:
         key = self.image_key(material, live, self.light)
         return self.cache.get_cached(key, ShadedTerm) is not None or self.transfer.has_image(key[1:])
 
-    def operator(self, material: MaterialImage, live: LiveTerm) -> LinearOperator | None:
-        """Return the active operator of a term, a coarse one until the exact one is ready; None if it was evicted."""
-        ready = live.ready
-        if ready.basis is None or not live.is_converged:
+    def operator(
+        self, material: MaterialImage, live: LiveTerm, image: DisplayedImage | None = None
+    ) -> LinearOperator | None:
+        """Return the active operator of a term, a coarse one until the exact one is ready; None if it was evicted.
+
+        Args:
+            material, live: the term. image: that it updates; None: the newest.
+        """
+        updated = live.ready if image is None else image
+        if updated.basis is None or updated.light is None or not updated.is_converged:
             return None
-        key = self.operator_key(material, live, ready.basis, ready.bands)
+        key = self.operator_key(material, live, updated.basis, updated.bands, light=updated.light)
         candidates = (self.cache.get_cached(name, LinearOperator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))
         return next((operator for operator in candidates if operator is not None), None)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from relume.live.fixed_camera.strategies.cached_image import CACHED_IMAGE
+from relume.live.fixed_camera.strategies.earlier_reflectances import EARLIER_REFLECTANCES
 from relume.live.fixed_camera.strategies.incremental_light import INCREMENTAL_LIGHT
 from relume.live.fixed_camera.strategies.linear_mix import LINEAR_MIX
 from relume.live.fixed_camera.strategies.operator import OPERATOR
@@ -17,6 +18,7 @@ STRATEGIES: tuple[Strategy, ...] = (
     TEXEL_SUM,
     OPERATOR,
     INCREMENTAL_LIGHT,
+    EARLIER_REFLECTANCES,
     SPARSE_PREVIEW,
     SHADE,
 )
