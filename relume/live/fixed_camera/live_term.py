@@ -101,14 +101,14 @@ class LiveTerm:
 
     def lobe_beside(self, basis: EditBasis) -> LobeSampling | None:
         """Return the lobe along which the light of an operator is traced; None if the basis changes the lobe."""
-        return None if self._changes_lobe(basis) else self.lobe
+        return None if self.changes_lobe(basis) else self.lobe
 
     def mark_lobe(self, image: DisplayedImage) -> DisplayedImage:
         """Return an operator's image, marked if the operator changes the lobe, which it cannot trace."""
-        changes_lobe = image.basis is not None and self._changes_lobe(image.basis)
+        changes_lobe = image.basis is not None and self.changes_lobe(image.basis)
         return replace(image, traces_lobe=False) if changes_lobe and image.traces_lobe else image
 
-    def _changes_lobe(self, basis: EditBasis) -> bool:
+    def changes_lobe(self, basis: EditBasis) -> bool:
         """Return whether the curve that shapes the lobe is free in a basis."""
         curve = lobe_curve(self.document["model"])
         return curve is not None and curve.name in basis.affected_curves

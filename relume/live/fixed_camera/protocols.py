@@ -200,6 +200,29 @@ class OpenBake(Protocol):
         ...
 
 
+class LobeShader(Protocol):
+    """Images of narrow terms by few rays a sample; `relume.live.opened.few_lobe_rays` implements it."""
+
+    def is_prepared(self, light: Illumination) -> bool:
+        """Return whether `shade` only traces. light: the illumination"""
+        ...
+
+    def prepare(self, light: Illumination) -> None:
+        """Cache all that `shade` needs besides rays. light: the illumination"""
+        ...
+
+    def shade(
+        self, samples: Samples, view: View, material: int, light: Illumination, document: Mapping[str, Any]
+    ) -> Shaped[F32, "n 3"] | None:
+        """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
+
+        Args:
+            samples: all samples of a material of a view. view, material: the view, and the index.
+            light: the illumination. document: the term.
+        """
+        ...
+
+
 class FixedViewTransfer(OpenBake, Protocol):
     """One open bake of fixed views.
 
@@ -273,6 +296,11 @@ class FixedViewTransfer(OpenBake, Protocol):
         Raises:
             CancelledError: `is_canceled` returned true.
         """
+        ...
+
+    @property
+    def few_lobe_rays(self) -> LobeShader:
+        """Images of narrow terms by few rays a sample."""
         ...
 
     def downsampled(self, view_name: str, step: int) -> Self:

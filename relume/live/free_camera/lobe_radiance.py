@@ -55,10 +55,7 @@ _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.flo
 _PI = np.float32(math.pi)
 # normals of a pixel at which a bright light is evaluated: most if their spread is larger than light and lobe
 _LEAST_JITTERS, _JITTERS_OF_EQUAL, _MOST_JITTERS = 8, np.float32(16), 64
-_REACH = 2  # pixels from which rays are shared
 _CORE_BLUR, _TAIL_BLUR = np.float32(0.5), np.float32(2)  # of the environment, by the width of the lobe
-_SHARED_PART = np.float32(0.5)  # of the squared widths of lobe and pixel
-_LEAST_WEIGHT = np.float32(1e-3)  # of the nearest neighbor, where no other agrees
 _DIRECTION_SEED = np.uint32(0x27D4EB2F)
 _MARGIN = np.float32(1.5)  # around a bright light, which blurred texels exclude
 
@@ -322,67 +319,3 @@ def lobe_widths(pattern: LobePattern) -> Shaped[F32, " 2"]:
     last = pattern.quantile.shape[1] - 1
     angle = pattern.quantile[0, [last // 2, int(0.999 * last)]] * (2 if pattern.is_half_angle else 1)
     return np.asarray(angle, np.float32)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _mirror_direction(points, p, wo):  # type: ignore[no-untyped-def]
-    """Mirror direction of a point, a tuple."""
-    n, o = points.normal[p], wo[p]
-    twice = _TWO * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
-    return twice * n[0] - o[0], twice * n[1] - o[1], twice * n[2] - o[2]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _share(row_of_pixel, width, pixel, points, wo, footprint, lobe_width, radiance, start, stop, out):  # type: ignore[no-untyped-def]
-    """Average neighbors of points [start, stop); see `share_with_neighbors`. lobe_width: radians"""
-    height = row_of_pixel.shape[0] // width
-    for p in range(start, stop):
-        y = pixel[p] // width
-        x, n, position, r = pixel[p] - y * width, points.normal[p], points.position[p], _mirror_direction(points, p, wo)
-        spread = spread_of(footprint[p])
-        sharpness = _ONE / (_SHARED_PART * (lobe_width * lobe_width + spread * spread) + np.float32(1e-12))
-        total = _ZERO
-        for row in range(max(y - _REACH, 0), min(y + _REACH + 1, height)):
-            for column in range(max(x - _REACH, 0), min(x + _REACH + 1, width)):
-                q = row_of_pixel[row * width + column]
-                if q < 0:
-                    continue
-                other, s = points.position[q], _mirror_direction(points, q, wo)
-                dx, dy, dz = other[0] - position[0], other[1] - position[1], other[2] - position[2]
-                rise = n[0] * dx + n[1] * dy + n[2] * dz
-                is_near = rise * rise <= np.float32(0.25) * (dx * dx + dy * dy + dz * dz)
-                dx, dy, dz = r[0] - s[0], r[1] - s[1], r[2] - s[2]
-                weight = np.float32(math.exp(-sharpness * (dx * dx + dy * dy + dz * dz))) if is_near else _ZERO
-                distance = np.float32((row - y) * (row - y) + (column - x) * (column - x))
-                weight += _LEAST_WEIGHT / (_ONE + distance * distance * distance)
-                total += weight
-                for channel in range(3):
-                    out[p, channel] += weight * radiance[q, channel]
-        scale = _ONE / max(total, np.float32(1e-20))
-        for channel in range(3):
-            out[p, channel] *= scale
-
-
-def share_with_neighbors(
-    radiance: Shaped[F32, "n 3"],
-    is_traced: Shaped[NDArray[np.bool_], " n"],
-    pixel: Shaped[NDArray[np.integer], " n"],
-    size: tuple[int, int],
-    receivers: ShadingPoints,
-    footprint: Shaped[F32, "n 2 2 3"],
-    lobe_width: np.float32,
-) -> Shaped[F32, "n 3"]:
-    """Average the radiance in lobes over neighbors whose mirror directions differ by less than the lobe, or a pixel.
-
-    Args:
-        radiance: of each point. is_traced: points that have any, at most one in each pixel.
-        pixel: of each point. size: of the image, pixels. receivers, footprint: as in `mean_lobe_radiance`.
-        lobe_width: from `lobe_widths`.
-    """
-    width, height = size
-    row_of_pixel = np.full(width * height, -1, np.int32)
-    row_of_pixel[pixel[is_traced]] = np.flatnonzero(is_traced)
-    out = np.zeros_like(radiance)
-    args = row_of_pixel, width, pixel.astype(np.int64), receivers.points, receivers.wo, footprint, lobe_width
-    parallel_for_chunks(lambda start, stop: _share(*args, radiance, start, stop, out), len(pixel))
-    return out

@@ -19,20 +19,14 @@ from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.lobe_radiance import (
-    add_direct_lights,
-    lobe_widths,
-    mean_lobe_radiance,
-    share_with_neighbors,
-)
 from relume.live.free_camera.lobe_terms import TracedLobe
 from relume.live.free_camera.normal_mapping import normalize
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.shade_pixels import blend, interpolate_uv, perturbed_normal, texture_footprint
+from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
 from relume.live.free_camera.texture_kernels import sample_texture
 from relume.probes.stored_scene import NORMAL_MAP, StoredScene
-from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
@@ -42,11 +36,6 @@ from relume.views.pixel_footprint import pixel_footprint
 
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
-
-_MAX_RAYS = 60_000  # of a frame, for 15 frames a second on two cores
-_MOST_RAYS = 8  # of a pixel
-_STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads pixels evenly
-_SEED = 1
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -151,7 +140,7 @@ def add_lobe_rays(
     for k, index in chosen.items():
         if len(index):
             rows = (index if rays is None else rays[index]).astype(np.int32)
-            _add_lobe(*scene_args, lobes[k], _MAX_RAYS / num_points, rows, out)
+            _add_lobe(*scene_args, lobes[k], MAX_RAYS / num_points, rows, out)
 
 
 def _add_lobe(
@@ -186,47 +175,9 @@ def _add_lobe(
     footprint = np.zeros((len(rows), 2, 2, 3), np.float32)
     centers = slice(0, num_centers)
     footprint[centers] = pixel_footprint(rows[centers], size[0], points.rows(centers), wo[centers])
-    core, pattern = (
-        make_lobe_pattern(sampling, int(np.clip(rays_per_point, 1, _MOST_RAYS)), _SEED)
-        for sampling in (lobe.core, lobe.sampling)
-    )
-    light_args = lobe_scene, environment, receivers, footprint
-    width, is_direct = lobe_widths(pattern)[0], light.paths.direct
-    radiance = _trace_some(*light_args, core, width, rows, gbuffer, size, rays_per_point, is_direct=is_direct)
-    if light.paths.direct:
-        add_direct_lights(*light_args, pattern, transfer.lobe_local_rays(light, points), radiance)
+    image = ImagePoints(gbuffer.pixel_of_ray(size[0] * size[1])[rows], np.arange(len(rows)) < num_centers, size)
+    light_args = lobe_scene, environment, receivers, footprint, lobe, image, rays_per_point
+    local_rays = transfer.lobe_local_rays(light, points)
+    radiance = lobe_radiance(*light_args, local_rays, is_direct=light.paths.direct)
     args = *scene_args, pixel_angle, lobe.albedo, points, wo, radiance, rows
     parallel_for_chunks(lambda start, stop: _add_lobes(*args, start, stop, out), len(rows))
-
-
-def _trace_some(
-    lobe_scene: LobeScene,
-    environment: PrefilteredEnvironment,
-    receivers: ShadingPoints,
-    footprint: F32,
-    core: LobePattern,
-    lobe_width: np.float32,
-    rows: I32,
-    gbuffer: GBuffer,
-    size: tuple[int, int],
-    rays_per_point: float,
-    *,
-    is_direct: bool,
-) -> F32:
-    """Trace rays of some pixel centers, and share them among all rays of all pixels. (n, 3)
-
-    Args:
-        lobe_scene, environment, receivers, footprint, core, lobe_width, is_direct: of `mean_lobe_radiance`.
-        rows, gbuffer, size, rays_per_point: of `_add_lobe`.
-    """
-    (width, height), radiance = size, np.zeros((len(rows), 3), np.float32)
-    is_traced = rows < width * height
-    if not is_traced.any():  # rays of no image
-        return mean_lobe_radiance(lobe_scene, environment, receivers, footprint, core, lobe_width, is_direct=is_direct)
-    y, x = np.divmod(rows, width)
-    is_traced &= (x * _STEP_X + y * _STEP_Y) % 1.0 < rays_per_point
-    traced = np.flatnonzero(is_traced)
-    traced_args = receivers.without_light(traced), footprint[traced], core, lobe_width
-    radiance[traced] = mean_lobe_radiance(lobe_scene, environment, *traced_args, is_direct=is_direct)
-    share_args = is_traced, gbuffer.pixel_of_ray(width * height)[rows], size, receivers, footprint, lobe_width
-    return share_with_neighbors(radiance, *share_args)

@@ -27,6 +27,7 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
+from relume.live.opened.few_lobe_rays import FewLobeRays
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import (
     LobeTracer,
@@ -263,6 +264,11 @@ class BakedFixedViews:
         environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
         light_args = scene.outgoing, environment, scene.broad_share
         return LobeRays(hits, pattern, *light_args, footprint, scene.surfaces, peaks)
+
+    @cached_property
+    def few_lobe_rays(self) -> FewLobeRays:
+        """Images of narrow terms by few rays a sample."""
+        return FewLobeRays(self)
 
     def lobe_scene(self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False) -> LobeScene:
         """Return the surfaces that lobe rays meet, with their light.

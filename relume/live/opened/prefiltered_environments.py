@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Shaped
@@ -17,8 +19,10 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.free_camera.environment_lookup import EnvironmentLookup, build_environment_lookup
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, build_light_lists
-from relume.live.opened.fixed_views import BakedFixedViews
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
+
+if TYPE_CHECKING:
+    from relume.live.opened.fixed_views import BakedFixedViews
 
 F32 = NDArray[np.float32]
 
@@ -41,6 +45,13 @@ class PrefilteredEnvironments:
         """Order of the light triangles with neighbors in sequence."""
         return np.argsort(self.light_transport.tiles.traversal_key, kind="stable")
 
+    def has_environment_lookup(self, name: str | None) -> bool:
+        """Return whether an environment is blurred and cached."""
+        return self.light_transport.cache.contains(self._lookup_key(name))
+
+    def _lookup_key(self, name: str | None) -> tuple[Hashable, ...]:
+        return self.light_transport.cache_owner(name), "sky", name
+
     def environment_lookup(self, name: str | None) -> EnvironmentLookup:
         """Return an environment, and its blurred versions without bright lights."""
 
@@ -51,7 +62,7 @@ class PrefilteredEnvironments:
                 lambda degrees: prefiltered(downsampled_radiance, degrees),
             )
 
-        return self.light_transport.cache.get_value((self.light_transport.cache_owner(name), "sky", name), compute)
+        return self.light_transport.cache.get_value(self._lookup_key(name), compute)
 
     def bright_lights(self, environment: EnvironmentKey) -> Shaped[F32, "lights 7"]:
         """Return the bright lights of an environment, rotated; see `PrefilteredEnvironment`."""

@@ -2,7 +2,8 @@
 
 An edit of a curve or a parameter changes the light that the edited surface reflects to all others, and so the light of
 every image. During the drag each term shows its reference image, the edited one with its operator in the light of that
-reference. Direct light is then exact, and indirect light is that of before.
+reference. Direct light is then exact, and indirect light is that of before. A narrow lobe, which an operator does not
+resolve, is ray traced with few rays.
 """
 
 from __future__ import annotations
@@ -10,12 +11,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
 
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, equal_up_to_reflectances
+from relume.live.fixed_camera.jobs import Job, Priority, ignore_result
 from relume.live.fixed_camera.strategies import operator
-from relume.live.fixed_camera.strategies.strategy import Strategy
+from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget
+from relume.operators.shade import ShadedTerm
 
 
 def _is_ready(target: TermTarget, light: Illumination) -> bool:
@@ -24,7 +29,7 @@ def _is_ready(target: TermTarget, light: Illumination) -> bool:
     if reference is None or reference.light is None or not equal_up_to_reflectances(reference.light, light):
         return False
     changed = set(reference.changed_curves(live.target_bands))
-    if not changed:
+    if not changed or _traces_lobe(target, reference.light):
         return True
     steps = images.operator(material, live, reference)
     return steps is not None and reference.basis is not None and changed <= set(reference.basis.affected_curves)
@@ -34,20 +39,54 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     images, material, live = target
     reference = live.ready.reference
     assert reference is not None
+    assert reference.light is not None
+    image, state = live.ready.image, {"fidelity": Fidelity.APPROXIMATE, "light": light}
+    is_changed = bool(reference.changed_curves(live.target_bands))
+    if is_changed and _traces_lobe(target, reference.light):
+        shaded = _trace_lobe(target, reference.light)
+        live.set_ready(replace(live.ready, image=shaded, bands=live.target_bands, traces_lobe=True, **state))
+        return
     steps = images.operator(material, live, reference)
     if steps is not None:
         reference = live.mark_lobe(operator.advance(reference, live.target_bands, steps, None))
-    image = live.ready.image  # only the picture's own state refers to it
-    np.copyto(image, reference.image)
-    live.set_ready(
-        replace(
-            live.ready,
-            fidelity=Fidelity.APPROXIMATE,
-            bands=reference.bands,
-            light=light,
-            reference=reference,
-            traces_lobe=reference.traces_lobe,
-        )
+    np.copyto(image, reference.image)  # only the picture's own state refers to it
+    marks = {"bands": reference.bands, "reference": reference, "traces_lobe": reference.traces_lobe}
+    live.set_ready(replace(live.ready, image=image, **marks, **state))
+
+
+def _traces_lobe(target: TermTarget, light: Illumination) -> bool:
+    """Return whether few rays along the narrow lobe of a term show it: an operator would show noise."""
+    live, shader = target.live, target.images.transfer.few_lobe_rays
+    return live.lobe is not None and not live.levels.ratios and shader.is_prepared(light)
+
+
+def _trace_lobe(target: TermTarget, light: Illumination) -> Shaped[NDArray[np.float32], "tiles 3 samples"]:
+    """Return the image of a narrow term by few rays a sample."""
+    images, material, live = target
+    samples = images.transfer.samples(images.view, material.index, images.cache)
+    rows = images.transfer.few_lobe_rays.shade(samples, images.view, material.index, light, live.document)
+    assert rows is not None  # its lobe is narrow
+    if live.view_factor is not None:
+        rows /= np.maximum(live.view_factor.T, np.float32(1e-6))
+    return ShadedTerm.from_rows(rows).image
+
+
+def _preparation_job(situation: Situation) -> Job | None:
+    """Return the job that prepares lobe rays if the edited control changes the width of a lobe."""
+    prepared, shader = situation.control.prepared_control, situation.images.transfer.few_lobe_rays
+    light = situation.images.light
+    if prepared is None or prepared.basis is None or not light.paths.has_indirect or shader.is_prepared(light):
+        return None
+    if not prepared.target.live.changes_lobe(prepared.basis):
+        return None
+    key = "lobe rays", situation.images.transfer.key, light.environment
+    return Job(
+        key,
+        f"{prepared.target.name}, reflections",
+        Priority.CONTROL,
+        lambda progress, is_canceled: shader.prepare(light),
+        ignore_result,
+        state="precomputing",
     )
 
 
@@ -59,4 +98,5 @@ EARLIER_REFLECTANCES = Strategy(
     changes_light=True,
     is_ready=_is_ready,
     update=_update,
+    jobs={Urgency.PREPARED_CONTROL: _preparation_job},
 )

@@ -1,0 +1,102 @@
+"""Few lobe rays for each sample of a fixed view: the image of a narrow term while its width is dragged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.protocols import Samples
+from relume.live.free_camera.basis.outgoing_coefficients import cosines
+from relume.live.free_camera.environment_lookup import rotation_of
+from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.lobe_terms import split_terms
+from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
+from relume.live.opened.prefiltered_environments import PrefilteredEnvironments
+from relume.transport.lobe_scene import LobeScene
+from relume.views.view import View
+
+if TYPE_CHECKING:
+    from relume.live.opened.fixed_views import BakedFixedViews
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class FewLobeRays:
+    """Shades narrow terms of an opened bake by few rays a sample. See `relume.live.free_camera.lobe_radiance`."""
+
+    light_transport: BakedFixedViews
+
+    @cached_property
+    def _environments(self) -> PrefilteredEnvironments:
+        return PrefilteredEnvironments(self.light_transport)
+
+    def _scene(self, light: Illumination) -> LobeScene:
+        """Return the surfaces that rays meet, cached. light: the illumination"""
+        transport = self.light_transport
+        key = transport.key, "scene of lobe rays", light
+        return transport.cache.transient.get_value(key, lambda: transport.lobe_scene(light))
+
+    def environment(self, light: Illumination) -> PrefilteredEnvironment:
+        """Return the environment behind a scene, cached. light: the illumination"""
+        environment = light.environment
+        gain = light.environment_gain if light.has_environment else (0.0, 0.0, 0.0)
+        lookup, bright_lights = (
+            self._environments.environment_lookup(environment.map),
+            self._environments.bright_lights(environment),
+        )
+        return PrefilteredEnvironment(
+            lookup, bright_lights, rotation_of(environment.rotation), np.array(gain, np.float32)
+        )
+
+    def is_prepared(self, light: Illumination) -> bool:
+        """Return whether `shade` only traces: the blurred environment takes a second. light: the illumination"""
+        return self._environments.has_environment_lookup(light.environment.map)
+
+    def prepare(self, light: Illumination) -> None:
+        """Cache all that `shade` needs besides rays. light: the illumination"""
+        self.environment(light)
+        self._scene(light)
+
+    def shade(
+        self, samples: Samples, view: View, material: int, light: Illumination, document: Mapping[str, Any]
+    ) -> Shaped[F32, "n 3"] | None:
+        """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
+
+        Args:
+            samples: all samples of a material of a view. view, material: the view, and the index.
+            light: the illumination. document: the term.
+        """
+        traced, _ = split_terms([{**document, "color": [1.0] * 3, "texture": None}])
+        if traced is None:
+            return None
+        receivers = samples.receivers(is_lit=False)
+        image = self._image_points(view, material)
+        footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
+        light_args = self._scene(light), self.environment(light), receivers, footprint
+        rays_per_point = MAX_RAYS / max(np.count_nonzero(image.is_first), 1)
+        ray_args = traced, image, rays_per_point, local_rays
+        radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)
+        cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo).clip(0, 1)
+        albedo = [np.interp(-cosine, -cosines(), column) for column in traced.albedo[:, 0].T]
+        return np.asarray(np.stack(albedo, axis=1) * radiance, np.float32)
+
+    def _image_points(self, view: View, material: int) -> ImagePoints:
+        """Return the samples of a material as points of their image, cached."""
+        transport = self.light_transport
+
+        def compute() -> ImagePoints:
+            pixel = view.pixel[view.rows(material)]
+            is_first = np.zeros(len(pixel), np.bool_)
+            is_first[np.unique(pixel, return_index=True)[1]] = True
+            return ImagePoints(pixel, is_first, (view.width, view.height))
+
+        key = transport.key, *view.sample_key(material), "points of the image"
+        return transport.cache.transient.get_value(key, compute)
