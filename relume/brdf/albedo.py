@@ -91,6 +91,18 @@ class Reflectance:
         return replace(self, normals=None) if self.normals else self
 
 
+def max_albedo_change(before: Sequence[Reflectance], after: Sequence[Reflectance]) -> float:
+    """Return the greatest change of an albedo between two looks, over materials, slots and channels.
+
+    The albedo is ∫∫ f cos θi cos θo dωi dωo / π, one for a white diffuse surface.
+
+    Args:
+        before, after: one per material of the same scene.
+    """
+    changes = (abs(b.matrix[..., 0] - a.matrix[..., 0]).max() for b, a in zip(before, after, strict=True))
+    return float(max(changes, default=0.0)) / _white_albedo()
+
+
 Reflectances = tuple[Reflectance, ...]
 """One per material."""
 
@@ -102,6 +114,13 @@ def material_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap 
         terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
     """
     return _sum_reflectance(tuple(map(FrozenTerm.from_document, terms)), normals)
+
+
+@lru_cache(maxsize=1)
+def _white_albedo() -> float:
+    """First entry of F for a white diffuse term."""
+    white = {"model": "lambert", "color": [1.0] * 3, "params": {}, "curves": {}, "texture": None}
+    return float(reflectance_matrix(white)[0, 0])
 
 
 @lru_cache(maxsize=256)

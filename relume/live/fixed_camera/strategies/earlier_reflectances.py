@@ -1,9 +1,9 @@
 """Terms in the light before an edit: what other surfaces receive from the edited one follows when the drag ends.
 
 An edit of a curve or a parameter changes the light that the edited surface reflects to all others, and so the light of
-every image. During the drag each term shows its reference image, the edited one with its operator in the light of that
-reference. Direct light is then exact, and indirect light is that of before. A narrow lobe, which an operator does not
-resolve, is ray traced with few rays.
+every image. If the albedo changes little, each term shows its reference image during the drag, the edited one with its
+operator in the light of that reference. Direct light is then exact, and indirect light is that of before. A narrow
+lobe, which an operator does not resolve, is ray traced with few rays.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.albedo import max_albedo_change
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, equal_up_to_reflectances
 from relume.live.fixed_camera.jobs import Job, Priority, ignore_result
@@ -22,12 +23,16 @@ from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Ur
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.operators.shade import ShadedTerm
 
+_MAX_ALBEDO_CHANGE = 0.25
+
 
 def _is_ready(target: TermTarget, light: Illumination) -> bool:
     images, material, live = target
     reference = live.ready.reference
     if reference is None or reference.light is None or not equal_up_to_reflectances(reference.light, light):
         return False
+    if max_albedo_change(reference.light.reflectances, light.reflectances) > _MAX_ALBEDO_CHANGE:
+        return False  # other surfaces show it
     changed = set(reference.changed_curves(live.target_bands))
     if not changed or _traces_lobe(target, reference.light):
         return True
