@@ -4,7 +4,8 @@ The bake stores rays, not results: one visibility bit per view sample and light 
 triangles, and each view's samples), then "visibility" (rows of each view).
 
     scene/positions, normals, faces, face_material, face_mesh   triangles, for rays that looks require
-    scene/uvs, alpha_masks/…                             of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
+    scene/uvs                                            of the corners
+    alpha_masks/…                                        of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
     lights/environment                                   radiance, to weight it again
     lights/tiles                                         relume.lights.sphere_tiles.Tiles
     lights/nodes, direction, irradiance                  relume.lights.spherical_triangles.TriangleLights
@@ -261,15 +262,12 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
 def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[Any]]:
     """Return the merged triangles of a scene, as arrays of a store."""
     arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
-    arrays["scene/normals"] = geometry.normals.astype(np.float16)
+    arrays |= {"scene/normals": geometry.normals.astype(np.float16), "scene/uvs": geometry.uvs}
     if has_emission_images(scene):
         arrays["scene/face_emission"] = relative_emission(scene)
     alpha_test = geometry.embree.alpha_test
     if alpha_test is not None:
-        arrays |= {
-            "scene/uvs": alpha_test.uvs,
-            **{f"alpha_masks/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()},
-        }
+        arrays |= {f"alpha_masks/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()}
     return arrays
 
 

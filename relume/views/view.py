@@ -14,10 +14,11 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import RoughnessLevels
+from relume.brdf.texture_slots import EmissionImage
 from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.images.image_store import load_texture
+from relume.images.image_store import load_emission_image, load_texture
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.texture import sample_image
@@ -141,17 +142,27 @@ class View:
         """
 
         def sample() -> F32:
-            rows = self.rows(material)
-            uv = read_uv(self.store, self.index, rows.start, rows.stop)
-            if uv is None:
-                raise StoreError("this bake is too old for uploaded images; bake the scene again")
-            return sample_image(load_texture(name), uv)
+            return sample_image(load_texture(name), self._uv(self.rows(material)))
 
         return self.cache.get_value((self.key, "image", *self.sample_key(material), name), sample)
 
-    def emissive(self, material: int) -> Shaped[F32, "n channels"]:
-        """Read the emission of a material's samples relative to its mean; 3 channels with emission textures, else 1."""
+    def _uv(self, rows: slice) -> Shaped[F32, "n 5"]:
+        uv = read_uv(self.store, self.index, rows.start, rows.stop)
+        if uv is None:
+            raise StoreError("this bake is too old for uploaded images; bake the scene again")
+        return uv
+
+    def emissive(self, material: int, image: EmissionImage | None = None) -> Shaped[F32, "n channels"]:
+        """Return the emission of a material's samples over its mean; 3 channels with emission images, else 1.
+
+        Args:
+            material: its index. image: emitted image of a look; None: the scene's own.
+        Raises:
+            NotFoundError, SceneError: the image cannot be loaded. StoreError: as `image`.
+        """
         rows = self.rows(material)
+        if image is not None:
+            return sample_image(load_emission_image(image), self._uv(rows))
         if not self.store.attributes.get("has_emission_images"):
             return np.ones((rows.stop - rows.start, 1), np.float32)
         return np.asarray(self.store.read(f"views/{self.index}/emission", rows.start, rows.stop), np.float32)
