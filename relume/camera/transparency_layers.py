@@ -25,6 +25,7 @@ from relume.scene.model import Material
 F32 = NDArray[np.float32]
 
 
+_NEXT_FACET = np.array([0.7548776662, 0.5698402910])  # R2 sequence, from one glass surface to the next
 # arrays of a layer with one row per ray
 _ARRAYS = ("ray", "directions", "transmittance", "is_visible", "origins", "is_mirrored", "key")
 
@@ -110,6 +111,7 @@ def trace_layers(
     pixel_angle: float = 0.0,
     *,
     traces_mirrors: bool = True,
+    facets: Shaped[NDArray[np.float64], "n 2"] | None = None,
 ) -> list[TransparencyLayer]:
     """Trace camera rays through glass and off mirrors.
 
@@ -118,6 +120,7 @@ def trace_layers(
         directions: unit. alpha_sample: see `trace_rays`.
         pixel_angle: angle of a pixel, radians, to filter textures on mirrors.
         traces_mirrors: add layers of reflections in mirrors.
+        facets: two numbers in [0, 1) for each ray, which choose the facets of frosted glass; None: glass is clear.
     Returns:
         First a layer of all rays; then the layers of continued rays.
     """
@@ -139,7 +142,8 @@ def trace_layers(
         is_visible, is_mirrored = np.ones(len(paths.ray), np.bool_), np.zeros(len(paths.ray), np.bool_)
         glass_rows = np.flatnonzero(is_hit & glass.is_glass[material])
         if len(glass_rows):
-            is_outer, refracted = refract(geometry, glass, paths, hits, glass_rows)
+            chosen = None if facets is None else (facets[paths.ray[glass_rows]] + paths.num_glass * _NEXT_FACET) % 1
+            is_outer, refracted = refract(geometry, glass, paths, hits, glass_rows, chosen)
             is_visible[glass_rows] = is_outer & (paths.num_glass < MAX_VISIBLE_GLASS)
             if paths.num_glass + 1 < MAX_GLASS_HITS and fits():
                 queue.append(refracted)

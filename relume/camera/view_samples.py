@@ -204,7 +204,7 @@ def _sample_tiles(
     rows, num_samples, num_rays = ExternalSort(scratch), edges.num_single_samples, 0
 
     def process_tile(tile: ImageTile) -> tuple[dict[str, NDArray[Any]], int, int]:
-        rays, num_edge_samples, num_traced = camera_setup.trace_tile(tile, edges.is_edge, positions)
+        rays, num_edge_samples, num_traced = camera_setup.trace_tile(tile, edges, positions)
         return _sorted_samples(camera_setup, rays), num_edge_samples, num_traced
 
     for columns, num_edge_samples, num_traced in map_ordered(

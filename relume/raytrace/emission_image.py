@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.color import luminance
+from relume.core.color import LUMINANCE
 from relume.raytrace.surface_interaction import triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Texture
@@ -40,9 +40,9 @@ class ImageEmitter(NamedTuple):
 
     def relative_radiance(self, channel: int | None) -> Shaped[F32, " T"]:
         """Return the radiance of each piece over the mean, of a channel or, for None, of luminance."""
-        if channel is not None:
-            return self.radiance[:, channel] / np.float32(max(self.mean[channel], _MIN_MEAN))
-        return luminance(self.radiance) / np.float32(max(luminance(np.array(self.mean, np.float32)), _MIN_MEAN))
+        weights = np.array(LUMINANCE) if channel is None else np.eye(3)[channel]
+        radiance, mean = (np.asarray(rgb, np.float64) @ weights for rgb in (self.radiance, self.mean))
+        return np.asarray(radiance / max(float(mean), _MIN_MEAN), np.float32)
 
 
 def image_emitter(
@@ -92,4 +92,5 @@ def _division(n: int) -> Shaped[F32, "pieces 3 3"]:
 
 def _divide(values: Shaped[F32, "triangles 3 c"], weights: Shaped[F32, "pieces 3 3"]) -> Shaped[F32, "all_pieces 3 c"]:
     """Interpolate values at triangles' corners to the corners of their pieces."""
-    return np.einsum("pkl,tlc->tpkc", weights, values).reshape(-1, 3, values.shape[2]).astype(np.float32)
+    pieces = np.einsum("pkl,tlc->tpkc", weights, values)
+    return np.asarray(pieces.reshape(-1, 3, values.shape[2]), np.float32)

@@ -98,8 +98,8 @@ class MaterialState(NamedTuple):
         """
         none = [None] * len(terms)
         overrides = tuple(
-            ProbeMapOverrides(user_images(material_terms), *maps)
-            for material_terms, *maps in zip(terms, normals or none, emission or none, strict=True)
+            ProbeMapOverrides(user_images(material_terms), normal_map, image)
+            for material_terms, normal_map, image in zip(terms, normals or none, emission or none, strict=True)
         )
         cached = previous.projected if previous is not None else [None] * len(terms)
         projected = [_project_terms(material_terms, item) for material_terms, item in zip(terms, cached, strict=True)]

@@ -119,7 +119,6 @@ def test_an_image_of_emission_shines_and_lights_the_scene(editor: Editor, stripe
     expect(light).to_have_count(1)
     editor.slider("Emission intensity").press("End")
     bright = editor.pixels()
-    page.screenshot(path="/tmp/emission.png")
     height, width, _ = bright.shape
     assert (bright - plain)[height // 2, width // 2].max() > 20
     assert (bright - plain).max(axis=2)[-height // 6 :].max() > 20  # the floor
