@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
+from scipy.stats.qmc import Sobol
 
 from relume.camera.edge_detection import (
     find_edge_pixels,
@@ -31,7 +32,8 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _GOLDEN_RATIO_CONJUGATE = (5**0.5 - 1) / 2
-_FACETS_PER_POSITION = 2  # of frosted glass
+_FACETS_PER_POSITION, _FACETS_PER_RAY = 2, 4  # of frosted glass; at successive surfaces, then from the first again
+FROST_PERIOD = 4  # pixels; `relume.views.frost_filter` averages over as many
 _PIXEL_CENTER = np.full((1, 2), 0.5)
 
 
@@ -190,18 +192,20 @@ def _shows(
     return out
 
 
-def stratified_facets(pixel: NDArray[np.int64], width: int, num: int) -> Shaped[F64, "rays 2"]:
-    """Choose facets of frosted glass for the rays of pixels: a Hammersley set, shifted from pixel to pixel.
+def stratified_facets(pixel: NDArray[np.int64], width: int, num: int) -> Shaped[F64, "rays surfaces 2"]:
+    """Choose facets of frosted glass for the rays of pixels.
+
+    At the first surface the rays of a pixel are a (0, m, 2)-net, and those of any 4 × 4 pixels are the net of a longer
+    Sobol sequence; at the next surfaces they are its further dimensions.
 
     Args:
-        pixel: row-major indices. width: width of the image. num: rays of each pixel.
+        pixel: row-major indices. width: width of the image. num: rays of each pixel, a power of two.
     """
+    side = FROST_PERIOD
+    points = Sobol(2 * _FACETS_PER_RAY, scramble=False).random(side**2 * num) + 0.5 / (side**2 * num)
     y, x = np.divmod(pixel, width)
-    shift = [(52.9829189 * ((0.06711056 * (x + dx) + 0.00583715 * (y + dy)) % 1)) % 1 for dx, dy in ((0, 0), (47, 17))]
-    k = np.arange(num)
-    bit_reversed = sum(((k >> bit) & 1) / 2 ** (bit + 1) for bit in range(num.bit_length()))
-    points = np.stack([(k + 0.5) / num, bit_reversed + 0.5 / num], axis=1)
-    return np.asarray((points + np.stack(shift, axis=1)[:, None]) % 1).reshape(-1, 2)
+    chosen = points.reshape(side**2, num, _FACETS_PER_RAY, 2)[y % side * side + x % side]
+    return np.asarray(chosen.reshape(-1, _FACETS_PER_RAY, 2))
 
 
 def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:

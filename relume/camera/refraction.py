@@ -58,6 +58,11 @@ def has_glass(materials: Sequence[Material]) -> bool:
     return any(material.glass is not None for material in materials)
 
 
+def has_frost(materials: Sequence[Material]) -> bool:
+    """True if any material is frosted glass."""
+    return bool(glass_surfaces(materials).is_frosted.any())
+
+
 def glass_surfaces(materials: Sequence[Material]) -> GlassSurfaces:
     """Collect the glass parameters of materials."""
     glasses = [material.glass or Glass() for material in materials]
@@ -119,7 +124,7 @@ def refract(
     path_key = paths.path_key[rows]
     path_key = np.where(alpha > 0, path_key + ((1 + paths.ray[rows] % _MAX_RAYS_PER_PIXEL) << _KEY_BITS), path_key)
     offset = np.where(is_total_reflection, 0, 2 * geometry.epsilon * np.sign(facing))[:, None] * face_normal
-    return is_outer, RayPaths(
+    continued = RayPaths(
         paths.ray[rows],
         (points.position + offset).astype(np.float32),
         new_directions.astype(np.float32),
@@ -128,7 +133,10 @@ def refract(
         paths.num_glass + 1,
         None if paths.chain is None else paths.chain.rows(rows),
         path_key,
+        np.where((alpha > 0) & (paths.frost[rows] == 0), material + 1, paths.frost[rows]).astype(np.uint16),
     )
+    is_scattered_back = (alpha > 0) & ~transmittance.any(axis=1)
+    return is_outer, continued.rows(~is_scattered_back) if is_scattered_back.any() else continued
 
 
 def visible_facets(

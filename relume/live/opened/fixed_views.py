@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -49,6 +50,7 @@ from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
+from relume.views.frost_filter import RAY_SPACING
 from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View, open_view
 
@@ -323,10 +325,13 @@ class BakedFixedViews:
         )
 
     def background_in(self, environment: EnvironmentKey, view: View) -> Shaped[NDArray[np.float32], "n 3"]:
-        """Return the radiance of a view's background samples."""
-        if environment == BAKED_ENVIRONMENT:
-            return view.background()
-        return self.environment_along(environment, view.background_directions())
+        """Return the radiance of a view's background samples, of rays through frosted glass within their spacing."""
+        directions = view.background_directions()
+        is_baked = environment == BAKED_ENVIRONMENT
+        radiance = view.background() if is_baked else self.environment_along(environment, directions)
+        for alpha, rows in view.frosted_background():
+            radiance[rows] = self.environment_along(environment, directions[rows], math.degrees(alpha * RAY_SPACING))
+        return radiance
 
     def environment_along(
         self, environment: EnvironmentKey, directions: Shaped[NDArray[np.float64], "n 3"], blur: float = 0
