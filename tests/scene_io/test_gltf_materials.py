@@ -242,7 +242,7 @@ def test_an_invalid_index_of_opaque_materials_gives_a_warning(ior: float, color:
 def test_glass_is_as_rough_as_its_surface() -> None:
     scene = imported({"transmission": {"transmissionFactor": 1}})
     assert scene.materials[0].glass is not None
-    assert scene.materials[0].glass.roughness == pytest.approx(1.0)
+    assert scene.materials[0].glass.roughness == pytest.approx(0.5)
 
 
 def test_transmission_textures_give_a_warning() -> None:
