@@ -17,7 +17,7 @@ from scipy.sparse import csr_array, eye_array
 F32 = NDArray[np.float32]
 
 REACH = 2  # pixels to each side
-RAY_SPACING = 0.35  # angle between the 256 rays, radians over the width α of the facets; less than that of the lobe
+RAY_SPACING = 0.2  # angle between the 256 rays, radians over the width α of the facets; less than that of the lobe
 MAX_FROSTED_RATIO = 8.0  # radiance of the environment over its mean; the excess is a bright light
 GLOW_WIDTH = 2.0  # of bright lights, radians over α
 _WEIGHTS = 1.0, 2.0, 2.0, 2.0, 1.0  # along each axis

@@ -19,6 +19,7 @@ from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
 from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.reference import reference_image
 from relume.scene.model import Glass, Material
 from relume.scene.scene_folder import load_scene, save_scene
 from relume.scene.validate import check_glass
@@ -132,6 +133,13 @@ def test_the_picture_is_clean(bake) -> None:
     columns = np.arange(image.shape[1])
     smooth = np.polynomial.Polynomial.fit(columns, image.mean(axis=0), 7)(columns)
     assert relative_rmse(image, np.broadcast_to(smooth, image.shape)) < 0.02
+
+
+def test_it_agrees_with_the_reference(bake) -> None:
+    scene, transfer = bake
+    look = make_look(transfer)
+    image, reference = render_image(transfer, "front", look), reference_image(scene, "front", look, SIZE, 1)
+    assert relative_rmse(image[4:-4, 4:-4], reference[4:-4, 4:-4]) < 0.02
 
 
 def test_the_filter_keeps_the_light_of_the_image(bake) -> None:
