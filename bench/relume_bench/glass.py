@@ -4,7 +4,7 @@ A gray floor with a clear ball, an absorbing ball and a green pane in front of a
 sun, all paths. Mitsuba's volpath refracts light paths as well: caustics and internal reflections are part of the error.
 Regions of the image are in the context: the floor in front of the glass, the pane, the balls.
 
-Frosted: a ball of glass and a slab before the red ball, with GGX facets, under an even sky, in the pixels that show
+Frosted: a ball of glass and a slab before the red ball, with GGX facets, in uniform light, in the pixels that show
 them.
 """
 
@@ -113,7 +113,7 @@ def glass_scene() -> Scene:
 
 
 def frosted_scene() -> Scene:
-    """A red ball behind a slab of frosted glass, and a frosted ball, under an even sky."""
+    """A red ball behind a slab of frosted glass, and a frosted ball, in uniform light."""
     clear = {"model": "ggx", "color": [1.0, 1.0, 1.0], "params": {"roughness": _FROST, "f0": [0.04, 0.04, 0.04]}}
     glass = Glass(thickness=0.05, roughness=_FROST)
     materials = [
@@ -130,8 +130,8 @@ def frosted_scene() -> Scene:
         sphere(0.35, 48).transform(np.eye(3), [0.3, 0.36, -0.3]).mesh("red", 2),
     ]
     camera = look_at("front", (0.3, 1.1, 3.4), (0.0, 0.4, 0.0), 0.7)
-    sky = Environment("even sky", np.ones((16, 32, 3), np.float32))
-    return make_scene("frosted", meshes, materials, [camera], sky)
+    environment = Environment("uniform", np.ones((16, 32, 3), np.float32))
+    return make_scene("frosted", meshes, materials, [camera], environment)
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:

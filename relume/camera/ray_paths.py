@@ -86,9 +86,9 @@ class RayPaths(NamedTuple):
 
     def rows(self, rows: Shaped[NDArray[np.bool_], " n"]) -> RayPaths:
         """Select paths, each with an origin of its own."""
-        arrays = (getattr(self, name)[rows] for name in ("ray", "origins", "directions", "transmittance", "length"))
+        names = "ray", "origins", "directions", "transmittance", "length", "path_key", "frost"
         chain = None if self.chain is None else self.chain.rows(rows)
-        return RayPaths(*arrays, self.num_glass, chain, self.path_key[rows], self.frost[rows])
+        return self._replace(chain=chain, **{name: getattr(self, name)[rows] for name in names})
 
     @property
     def num_mirrors(self) -> int:

@@ -99,4 +99,4 @@ def _coverage(
     front = front[index[pixel[front]] >= 0]
     row = index[pixel[front]]
     is_front = material[front] + 1 == glass[row]
-    return np.bincount(row[is_front], weight[front][is_front], len(glass))
+    return np.bincount(row[is_front], weight[front][is_front], len(glass)).astype(np.float64)

@@ -104,7 +104,7 @@ def resolve(
 
 
 def _frost_change(view: View, frost: FrostFilter, radiance: F32, throughput: F32) -> F32:
-    """What the filter of frosted glass adds to its pixels. (p, 3)"""
+    """Change of the pixels that show frosted glass by its filter. (p, 3)"""
     num, order = len(frost.pixel), np.ascontiguousarray(view.order[frost.entry])
     sums, tiles, ones = np.empty((num, 3), np.float32), np.array([[0, 0, num, 1]]), np.ones(3, np.float32)
     factors = np.ascontiguousarray(throughput[frost.entry])
