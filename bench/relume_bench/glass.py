@@ -1,8 +1,11 @@
-"""glass.rmse: a scene with glass against Mitsuba's full path tracer with its own dielectrics.
+"""glass.rmse, glass.rmse_frosted: scenes with glass against Mitsuba's full path tracer with its own dielectrics.
 
 A gray floor with a clear ball, an absorbing ball and a green pane in front of a red ball, under an environment with a
 sun, all paths. Mitsuba's volpath refracts light paths as well: caustics and internal reflections are part of the error.
 Regions of the image are in the context: the floor in front of the glass, the pane, the balls.
+
+Frosted: a ball of glass and a slab before the red ball, with GGX facets, in uniform light, in the pixels that show
+them.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.assets.environments.environment import Environment
 from relume.core.cache import Cache
 from relume.live.opened.openers import open_transfer
 from relume.look import validate
@@ -34,7 +38,9 @@ from relume_bench.standard_error import NoiseCorrectedError, compare_with_passes
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_NAME, _UNIT = "glass.rmse", "relative RMSE"
+_NAME, _FROSTED_NAME, _UNIT = "glass.rmse", "glass.rmse_frosted", "relative RMSE"
+_FROST = 0.4  # roughness
+_FROSTED_REGIONS = {"slab": (0.44, 0.66, 0.32, 0.6), "ball": (0.12, 0.3, 0.38, 0.6)}
 _SIZE, _FINER, _SPP = (400, 300), 2, 128
 _DEPTH = 24
 _ABSORBED = (0.3, 1.5, 4.0)
@@ -47,7 +53,7 @@ _IMAGE_REGIONS = {
 def measure(tiny: bool) -> list[Figure]:
     """A bake and a render."""
     if (why := missing()) is not None:
-        return skipped((_NAME,), _UNIT, why)
+        return skipped((_NAME, _FROSTED_NAME), _UNIT, why)
     size, spp = ((40, 30), 2) if tiny else (_SIZE, _SPP)
     scene = glass_scene()
     with tempfile.TemporaryDirectory() as folder:
@@ -60,7 +66,19 @@ def measure(tiny: bool) -> list[Figure]:
         name: _compare_region(rendered, reference_passes, *bounds).summary for name, bounds in _IMAGE_REGIONS.items()
     }
     details = {**comparison.context, "size": list(size), "spp": PASSES * spp, **region_summaries}
-    return [Figure(_NAME, comparison.error.value, _UNIT, details, comparison.error.standard_error)]
+    clear = Figure(_NAME, comparison.error.value, _UNIT, details, comparison.error.standard_error)
+    return [clear, _measure_frosted(tiny, size, spp)]
+
+
+def _measure_frosted(tiny: bool, size: tuple[int, int], spp: int) -> Figure:
+    """Compare the pixels of frosted glass."""
+    scene = frosted_scene()
+    with tempfile.TemporaryDirectory() as folder:
+        rendered = _render_relume(scene, size, tiny, Path(folder))
+        reference_passes = _render_mitsuba(scene, size, spp, Path(folder))
+    slab, ball = (_compare_region(rendered, reference_passes, *bounds) for bounds in _FROSTED_REGIONS.values())
+    details = {"size": list(size), "spp": PASSES * spp, "ball": ball.summary, **slab.context}
+    return Figure(_FROSTED_NAME, slab.error.value, _UNIT, details, slab.error.standard_error)
 
 
 def _compare_region(
@@ -94,6 +112,28 @@ def glass_scene() -> Scene:
     return make_scene("glass", meshes, materials, [camera], sunny_environment())
 
 
+def frosted_scene() -> Scene:
+    """A red ball behind a slab of frosted glass, and a frosted ball, in uniform light."""
+    clear = {"model": "ggx", "color": [1.0, 1.0, 1.0], "params": {"roughness": _FROST, "f0": [0.04, 0.04, 0.04]}}
+    glass = Glass(thickness=0.05, roughness=_FROST)
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.6, 0.6, 0.6]},)),
+        Material("Frosted", (clear,), glass=glass),
+        Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
+    ]
+    left, bottom, width, height, front, depth = -0.3, 0.01, 1.2, 1.0, 0.5, 0.05
+    meshes = [
+        rectangle([-2, 0, 2], [4, 0, 0], [0, 0, -4]).mesh("floor", 0),
+        sphere(0.45, 48).transform(np.eye(3), [-0.9, 0.46, 0.2]).mesh("ball", 1),
+        rectangle([left, bottom, front], [width, 0, 0], [0, height, 0]).mesh("front", 1),
+        rectangle([left, bottom, front - depth], [0, height, 0], [width, 0, 0]).mesh("back", 1),
+        sphere(0.35, 48).transform(np.eye(3), [0.3, 0.36, -0.3]).mesh("red", 2),
+    ]
+    camera = look_at("front", (0.3, 1.1, 3.4), (0.0, 0.4, 0.0), 0.7)
+    environment = Environment("uniform", np.ones((16, 32, 3), np.float32))
+    return make_scene("frosted", meshes, materials, [camera], environment)
+
+
 def _render_relume(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:
     width, height = size
     recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), 60 if tiny else 2000)
@@ -116,5 +156,7 @@ def _dielectric(glass: Glass) -> Mapping[str, Any]:
         return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}
     max_absorption = max(*glass.absorbed, 1e-9)
     rate = {"type": "rgb", "value": [absorbed / max_absorption for absorbed in glass.absorbed]}
+    rough = {} if glass.roughness == 0 else {"alpha": glass.roughness**2, "distribution": "ggx"}
+    kind = "roughdielectric" if rough else "dielectric"
     inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
-    return {"type": "dielectric", "int_ior": glass.ior, "interior": inside}
+    return {"type": kind, "int_ior": glass.ior, "interior": inside, **rough}

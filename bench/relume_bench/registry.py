@@ -211,7 +211,7 @@ GROUPS = (
             for kind in ("rmse", "bias")
         ),
     ),
-    Group("relume_bench.glass", ("glass.rmse",)),
+    Group("relume_bench.glass", ("glass.rmse", "glass.rmse_frosted")),
     Group("relume_bench.roughness_maps", ("roughness.rmse",)),
     Group("relume_bench.real_files", ("assets.rmse",)),
     *(

@@ -176,6 +176,7 @@ PEERS = {
     "gather.incremental_error": "the same look, shaded",
     "gather.rmse_": "Mitsuba 3",
     "glass.rmse": "Mitsuba 3 `volpath`",
+    "glass.rmse_frosted": "Mitsuba 3 `volpath`",
     "large.bytes_ratio": "1, float32",
     "large.frame_ratio": "1, float32",
     "lights.rmse_": "Mitsuba 3",

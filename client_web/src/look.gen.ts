@@ -59,7 +59,7 @@ export interface MaterialLook {
   normal_map?: NormalMapLook | null;
 }
 
-/** All surfaces of a material emit and are visible; emission is radiance. */
+/** All surfaces of a material emit and are visible; emission is radiance. `image`: an uploaded image, "image:<id>", by which they emit: radiance is emission times its linear RGB. None: they emit as in the scene. */
 export interface MeshLook {
   intensity: number;
   color: [number, number, number];
@@ -67,6 +67,7 @@ export interface MeshLook {
   emission: [number, number, number];
   kind: "mesh";
   material: string;
+  image?: string | null;
 }
 
 /** An uploaded image that replaces a material's normal map: "image:<id>", and its strength as glTF's `scale`. */
@@ -148,7 +149,7 @@ export const DEFAULT_LIGHTS: LightsByKind = {
   spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
   directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], direction: [0, -1, 0] },
   rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
-  mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], material: "" },
+  mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], material: "", image: null },
 };
 
 export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "transport" | "display">> = {

@@ -32,6 +32,19 @@ class NormalMap(NamedTuple):
     scale: float = 1.0
 
 
+class EmissionImage(NamedTuple):
+    """An image that surfaces emit, relative to their mean emission.
+
+    Attributes:
+        image: "image:<id>" of an uploaded image. mean: its mean over the surfaces, linear RGB.
+        is_colored: its color varies over them.
+    """
+
+    image: str
+    mean: tuple[float, float, float]
+    is_colored: bool
+
+
 IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_000)
 """Store of uploaded images, filled by `relume.images.image_store`."""
 

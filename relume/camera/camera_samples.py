@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
+from scipy.stats.qmc import Sobol
 
 from relume.camera.edge_detection import (
     find_edge_pixels,
@@ -17,6 +18,7 @@ from relume.camera.edge_detection import (
     radiance_edge_threshold,
 )
 from relume.camera.merge_rays import MergedRays, concatenate_rays, merge_rays, unmerged
+from relume.camera.refraction import glass_surfaces
 from relume.camera.specular_hits import MAX_MIRROR_BOUNCES
 from relume.camera.tiling import MAX_CONCURRENT_TILES, ImageTile, image_tiles
 from relume.camera.transparency_layers import TransparencyLayer, trace_layers
@@ -27,8 +29,11 @@ from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera, Scene
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 
 _GOLDEN_RATIO_CONJUGATE = (5**0.5 - 1) / 2
+_FACETS_PER_POSITION, _FACETS_PER_RAY = 2, 4  # of frosted glass; at successive surfaces, then from the first again
+FROST_PERIOD = 4  # pixels; `relume.views.frost_filter` averages over as many
 _PIXEL_CENTER = np.full((1, 2), 0.5)
 
 
@@ -37,11 +42,13 @@ class EdgePixels:
     """Edge pixels of an image.
 
     Attributes:
-        is_edge: true if a pixel needs more rays than the one through its center.
+        is_edge: true if a pixel needs more rays than the one through its center. is_frosted: true for those that show
+            frosted glass, whose rays meet different facets.
         num_single_samples: total samples of the other pixels. num_rays: rays traced to find edges.
     """
 
     is_edge: Shaped[NDArray[np.bool_], " pixels"]
+    is_frosted: Shaped[NDArray[np.bool_], " pixels"]
     num_single_samples: int
     num_rays: int
 
@@ -81,18 +88,19 @@ class CameraSetup:
         return camera_directions(self.camera, self.size, at_x, at_y)
 
     def _trace_layers(
-        self, directions: F32, alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE
+        self, directions: F32, alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE, facets: F64 | None = None
     ) -> list[TransparencyLayer]:
         return trace_layers(
             self.geometry, self.scene.materials, self._origin, directions, alpha_sample, self.pixel_angle,
-            traces_mirrors=self.traces_mirrors,
+            traces_mirrors=self.traces_mirrors, facets=facets,
         )  # fmt: skip
 
     def find_edges(self, *, smooths: bool) -> EdgePixels:
         """Find the edge pixels of the image. smooths: if false, no pixel is an edge."""
         num_pixels = self.size[0] * self.size[1]
         is_edge, num_visible = np.zeros(num_pixels, np.bool_), np.zeros(num_pixels, np.uint8)
-        cosine = np.ones(num_pixels, np.float32)
+        cosine, is_frosted = np.ones(num_pixels, np.float32), np.zeros(num_pixels, np.bool_)
+        is_frosted_material = glass_surfaces(self.scene.materials).is_frosted
 
         def inspect_tile(tile: ImageTile) -> int:
             padded, pixel = tile.padded(self.size), tile.pixels(self.size)
@@ -104,12 +112,14 @@ class CameraSetup:
             num_visible[pixel] = tile.crop_from(padded, np.asarray(visible_counts))
             if smooths:
                 tile_edges, tile_cosine = self._find_tile_edges(padded, layers, directions)
+                frosted = _shows(self.geometry, layers, is_frosted_material, len(directions))
+                is_frosted[pixel] = tile.crop_from(padded, frosted)
                 is_edge[pixel], cosine[pixel] = tile.crop_from(padded, tile_edges), tile.crop_from(padded, tile_cosine)
             return sum(len(layer.ray) for layer in layers)
 
         num_rays = sum(map_ordered(inspect_tile, image_tiles(self.size), MAX_CONCURRENT_TILES))
-        is_edge |= is_normal_edge(cosine)
-        return EdgePixels(is_edge, int(num_visible[~is_edge].sum(dtype=np.int64)), num_rays)
+        is_edge |= is_normal_edge(cosine) | is_frosted
+        return EdgePixels(is_edge, is_frosted, int(num_visible[~is_edge].sum(dtype=np.int64)), num_rays)
 
     def _find_tile_edges(
         self, tile: ImageTile, layers: list[TransparencyLayer], directions: F32
@@ -131,28 +141,36 @@ class CameraSetup:
     def trace_tile(
         self,
         tile: ImageTile,
-        is_edge: Shaped[NDArray[np.bool_], " pixels"],
+        pixels: EdgePixels,
         positions: Shaped[NDArray[np.float64], "n 2"],
     ) -> tuple[MergedRays, int, int]:
         """Trace and merge the rays of a tile.
 
         Args:
-            tile: tile of the image. is_edge: True for edge pixels, for the whole image.
+            tile: tile of the image. pixels: edge pixels of the whole image.
             positions: positions of the rays within an edge pixel.
         Returns:
             Merged rays; the number of merged rays in edge pixels; the number of traced rays.
         """
         pixel = tile.pixels(self.size)
-        interior, edges = pixel[~is_edge[pixel]], pixel[is_edge[pixel]]
+        is_edge, is_frosted = pixels.is_edge[pixel], pixels.is_frosted[pixel]
+        interior, edges, frosted = pixel[~is_edge], pixel[is_edge & ~is_frosted], pixel[is_frosted]
         interior_layers = self._trace_layers(self._directions(interior))
         edge_layers = self._trace_layers(
             self._directions(edges, positions), _stratified_alpha_samples(edges, len(positions))
         )
-        merged_layers = [merge_rays(self.geometry, layer, edges, positions) for layer in edge_layers]
-        num_edge_samples, num_rays = (
-            sum(len(rays.pixel) for rays in merged_layers),
-            sum(len(layer.ray) for layer in interior_layers + edge_layers),
+        frosted_positions = np.tile(positions, (_FACETS_PER_POSITION, 1))
+        frosted_layers = self._trace_layers(
+            self._directions(frosted, frosted_positions),
+            np.repeat(STOP_AT_OPAQUE, len(frosted) * len(frosted_positions)),
+            stratified_facets(frosted, self.size[0], len(frosted_positions)),
         )
+        merged_layers = [
+            *(merge_rays(self.geometry, layer, edges, positions) for layer in edge_layers),
+            *(merge_rays(self.geometry, layer, frosted, frosted_positions) for layer in frosted_layers),
+        ]
+        num_edge_samples = sum(len(rays.pixel) for rays in merged_layers)
+        num_rays = sum(len(layer.ray) for layer in interior_layers + edge_layers + frosted_layers)
         return (
             concatenate_rays(
                 [*(unmerged(layer, interior) for layer in interior_layers), *merged_layers], MAX_MIRROR_BOUNCES
@@ -160,6 +178,34 @@ class CameraSetup:
             num_edge_samples,
             num_rays,
         )
+
+
+def _shows(
+    geometry: SceneBuffers, layers: list[TransparencyLayer], is_selected: NDArray[np.bool_], num_rays: int
+) -> NDArray[np.bool_]:
+    """True for rays that hit one of some materials in any layer. (num_rays,)"""
+    out = np.zeros(num_rays, np.bool_)
+    if is_selected.any():
+        for layer in layers:
+            face = layer.hits.face
+            out[layer.ray[(face >= 0) & is_selected[geometry.face_material[np.maximum(face, 0)]]]] = True
+    return out
+
+
+def stratified_facets(pixel: NDArray[np.int64], width: int, num: int) -> Shaped[F64, "rays surfaces 2"]:
+    """Choose facets of frosted glass for the rays of pixels.
+
+    At the first surface the rays of a pixel are a (0, m, 2)-net, and those of any 4 × 4 pixels are the net of a longer
+    Sobol sequence; at the next surfaces they are its further dimensions.
+
+    Args:
+        pixel: row-major indices. width: width of the image. num: rays of each pixel, a power of two.
+    """
+    side = FROST_PERIOD
+    points = Sobol(2 * _FACETS_PER_RAY, scramble=False).random(side**2 * num) + 0.5 / (side**2 * num)
+    y, x = np.divmod(pixel, width)
+    chosen = points.reshape(side**2, num, _FACETS_PER_RAY, 2)[y % side * side + x % side]
+    return np.asarray(chosen.reshape(-1, _FACETS_PER_RAY, 2))
 
 
 def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:

@@ -71,6 +71,7 @@ class RayPaths(NamedTuple):
         length: length of the path up to the origin.
         num_glass: number of glass surfaces since the camera.
         chain: mirrors on the path; None without mirrors. path_key: distinguishes paths over different mirrors.
+        frost: 1 + index of the material of the first frosted glass on the path; 0 for none.
     """
 
     ray: Shaped[NDArray[np.int64], " n"]
@@ -81,6 +82,13 @@ class RayPaths(NamedTuple):
     num_glass: int
     chain: SpecularChain | None
     path_key: Shaped[NDArray[np.int64], " n"]
+    frost: Shaped[NDArray[np.uint16], " n"]
+
+    def rows(self, rows: Shaped[NDArray[np.bool_], " n"]) -> RayPaths:
+        """Select paths, each with an origin of its own."""
+        names = "ray", "origins", "directions", "transmittance", "length", "path_key", "frost"
+        chain = None if self.chain is None else self.chain.rows(rows)
+        return self._replace(chain=chain, **{name: getattr(self, name)[rows] for name in names})
 
     @property
     def num_mirrors(self) -> int:
@@ -101,4 +109,5 @@ class RayPaths(NamedTuple):
             0,
             None,
             np.zeros(num, np.int64),
+            np.zeros(num, np.uint16),
         )

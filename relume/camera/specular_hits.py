@@ -60,7 +60,15 @@ def reflect_rays(
     path_key = paths.path_key[rows] * num_keys + geometry.face_mesh[mirror_hits.face] + 1
     transmittance, num_glass = paths.transmittance[rows], paths.num_glass
     return RayPaths(
-        paths.ray[rows], surface.points.position, reflected, transmittance, length, num_glass, chain, path_key
+        paths.ray[rows],
+        surface.points.position,
+        reflected,
+        transmittance,
+        length,
+        num_glass,
+        chain,
+        path_key,
+        paths.frost[rows],
     )
 
 

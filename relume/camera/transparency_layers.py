@@ -26,7 +26,7 @@ F32 = NDArray[np.float32]
 
 
 # arrays of a layer with one row per ray
-_ARRAYS = ("ray", "directions", "transmittance", "is_visible", "origins", "is_mirrored", "key")
+_ARRAYS = ("ray", "directions", "transmittance", "is_visible", "origins", "is_mirrored", "key", "frost")
 
 
 class TransparencyLayer(NamedTuple):
@@ -41,7 +41,8 @@ class TransparencyLayer(NamedTuple):
         origins: origins of the last path segment: the camera, or the last surface that changed the direction.
         chain: mirrors on the path; None without mirrors.
         is_mirrored: the surface is a mirror, and another layer has its reflection.
-        key: mesh index of the hit, −1 for the background; offset to distinguish paths over different mirrors.
+        key: mesh index of the hit, −1 for the background; offset to distinguish paths over different mirrors, facets.
+        frost: 1 + index of the material of the first frosted glass before the hit; 0 for none.
     """
 
     ray: Shaped[NDArray[np.int64], " n"]
@@ -53,6 +54,7 @@ class TransparencyLayer(NamedTuple):
     chain: SpecularChain | None
     is_mirrored: Shaped[NDArray[np.bool_], " n"]
     key: Shaped[NDArray[np.int64], " n"]
+    frost: Shaped[NDArray[np.uint16], " n"]
 
     def rows(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> TransparencyLayer:
         """Select rays."""
@@ -110,6 +112,7 @@ def trace_layers(
     pixel_angle: float = 0.0,
     *,
     traces_mirrors: bool = True,
+    facets: Shaped[NDArray[np.float64], "n surfaces 2"] | None = None,
 ) -> list[TransparencyLayer]:
     """Trace camera rays through glass and off mirrors.
 
@@ -118,6 +121,8 @@ def trace_layers(
         directions: unit. alpha_sample: see `trace_rays`.
         pixel_angle: angle of a pixel, radians, to filter textures on mirrors.
         traces_mirrors: add layers of reflections in mirrors.
+        facets: two numbers in [0, 1) for each ray and successive glass surface, which choose the facets of frosted
+            glass; None: glass is clear.
     Returns:
         First a layer of all rays; then the layers of continued rays.
     """
@@ -139,7 +144,9 @@ def trace_layers(
         is_visible, is_mirrored = np.ones(len(paths.ray), np.bool_), np.zeros(len(paths.ray), np.bool_)
         glass_rows = np.flatnonzero(is_hit & glass.is_glass[material])
         if len(glass_rows):
-            is_outer, refracted = refract(geometry, glass, paths, hits, glass_rows)
+            num_surfaces = 0 if facets is None else facets.shape[1]
+            chosen = None if facets is None else facets[paths.ray[glass_rows], paths.num_glass % num_surfaces]
+            is_outer, refracted = refract(geometry, glass, paths, hits, glass_rows, chosen)
             is_visible[glass_rows] = is_outer & (paths.num_glass < MAX_VISIBLE_GLASS)
             if paths.num_glass + 1 < MAX_GLASS_HITS and fits():
                 queue.append(refracted)
@@ -161,6 +168,7 @@ def trace_layers(
                 paths.chain,
                 is_mirrored,
                 key,
+                paths.frost,
             )
         )
     return layers

@@ -45,7 +45,17 @@ _NUM_LEVELS = 256
 _POINT_COLUMNS = ("position", "normal", "tangent")
 _SURFACE_COLUMNS = ("diffuse", "specular", "uv", "roughness", "normal_length", "emission", "surface_normal")
 _CHAIN_COLUMNS = ("mirror", "mirror_cosine", "mirror_tint")
-_SAMPLE_COLUMNS = ("pixel", "weight", "material", "level", "transmittance", "camera", "is_mirrored", "alpha_sample")
+_SAMPLE_COLUMNS = (
+    "pixel",
+    "weight",
+    "material",
+    "level",
+    "transmittance",
+    "camera",
+    "is_mirrored",
+    "frost",
+    "alpha_sample",
+)
 _COLUMNS = (*_SAMPLE_COLUMNS, *_POINT_COLUMNS, *_SURFACE_COLUMNS, *_CHAIN_COLUMNS)
 # required to find samples that light reaches through tinted glass
 _REQUIRED_COLUMNS = ("material", "level", "position", "normal")
@@ -71,6 +81,7 @@ class ViewSamples:
         camera: origin of the view direction: the camera, or the last surface that changed the path's direction.
         chain: mirrors on the path, padded with `NO_MIRROR`.
         is_mirrored: the surface is a mirror, and other samples have its reflection.
+        frost: 1 + index of the material of the first frosted glass before the sample; 0 for none.
         alpha_sample: alpha samples for rays at blended surfaces, see `relume.raytrace.surface_points.SurfacePoints`.
     """
 
@@ -84,6 +95,7 @@ class ViewSamples:
     camera: Shaped[F32, "n 3"]
     chain: SpecularChain
     is_mirrored: Shaped[NDArray[np.bool_], " n"]
+    frost: Shaped[NDArray[np.uint16], " n"]
     alpha_sample: Shaped[F32, " n"]
 
     @classmethod
@@ -204,7 +216,7 @@ def _sample_tiles(
     rows, num_samples, num_rays = ExternalSort(scratch), edges.num_single_samples, 0
 
     def process_tile(tile: ImageTile) -> tuple[dict[str, NDArray[Any]], int, int]:
-        rays, num_edge_samples, num_traced = camera_setup.trace_tile(tile, edges.is_edge, positions)
+        rays, num_edge_samples, num_traced = camera_setup.trace_tile(tile, edges, positions)
         return _sorted_samples(camera_setup, rays), num_edge_samples, num_traced
 
     for columns, num_edge_samples, num_traced in map_ordered(
@@ -264,6 +276,7 @@ def _sorted_samples(camera_setup: CameraSetup, rays: MergedRays) -> dict[str, ND
     return {
         "pixel": rays.pixel[order].astype(np.uint32), "weight": rays.weight[order], "material": material[order],
         "level": level, "transmittance": layer.transmittance, "camera": layer.origins, "is_mirrored": layer.is_mirrored,
+        "frost": layer.frost,
         "alpha_sample": np.zeros(len(order), np.float32),
         **{name: getattr(surface.points, name) for name in _POINT_COLUMNS},
         **{name: getattr(surface, name) for name in _SURFACE_COLUMNS},

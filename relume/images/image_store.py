@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from relume.brdf.texture_slots import IMAGES, NormalMap, is_user_image
+from relume.brdf.texture_slots import IMAGES, EmissionImage, NormalMap, is_user_image
 from relume.core.cache import asset_cached
 from relume.core.color import srgb_encode
 from relume.core.import_warnings import ImporterWarning, warning_of
@@ -36,6 +36,7 @@ from relume.scene.model import WRAPS, Texture, TextureEncoding
 THUMBNAIL_SIDE = 96
 _TEXELS, _THUMBNAIL = "texels.npy", "thumbnail.png"
 _MIN_MEAN_ROUGHNESS = 1 / 255  # divisor for black images
+_MIN_MEAN_EMISSION = 1e-6  # of a channel; below, it emits nothing
 
 
 class ImageRecipe(NamedTuple):
@@ -201,6 +202,11 @@ def load_normal_map(map_: NormalMap) -> Texture:
     return _load_normals(IMAGES.resolve(map_.image), map_.scale)
 
 
+def load_emission_image(emission: EmissionImage) -> Texture:
+    """Load an image that surfaces emit, divided by its mean. Raises what `load_texture` raises."""
+    return _load_emission(IMAGES.resolve(emission.image), emission.mean)
+
+
 def mean_roughness(name: str) -> float:
     """Mean of a roughness map. Raises what `load_texture` raises."""
     return _load_mean(IMAGES.resolve(name))
@@ -210,6 +216,15 @@ def mean_roughness(name: str) -> float:
 def _load_normals(path: Path, scale: float) -> Texture:
     texture = _load(path)
     return Texture(_raw_bytes(texture), texture.wrap, TextureEncoding("normal", (scale, scale, 1.0)))
+
+
+@asset_cached("emission image")
+def _load_emission(path: Path, mean: tuple[float, float, float]) -> Texture:
+    texture, inverse_mean = _load(path), 1 / np.maximum(mean, _MIN_MEAN_EMISSION)
+    if texture.encoding is None:
+        return Texture((texture.pixels * inverse_mean).astype(np.float32), texture.wrap)
+    red, green, blue = (inverse_mean * texture.encoding.scale).tolist()
+    return Texture(texture.pixels, texture.wrap, TextureEncoding("srgb", (red, green, blue)))
 
 
 @asset_cached("roughness map image")

@@ -98,7 +98,9 @@ def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping
             partial.get("environment", {}), default["environment"], previous["environment"]
         ),
         "background": _complete_background(partial.get("background", {}), default.get("background", {})),
-        "lights": complete_lights(partial.get("lights", {}), default["lights"], previous["lights"]),
+        "lights": complete_lights(
+            partial.get("lights", {}), default["lights"], previous["lights"], default["materials"]
+        ),
         "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
         "display": _complete_display(partial.get("display", {}), default["display"]),
     }

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, get_args
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
+from relume.brdf.texture_slots import check_image
 from relume.core.errors import Description
 from relume.core.validation import (
     MAX_COLOR,
@@ -15,7 +16,6 @@ from relume.core.validation import (
     invalid_value,
     names_text,
 )
-from relume.look.model import LightKind
 from relume.scene.model import Light
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
 
@@ -41,9 +41,8 @@ _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
     "spot": {**_POSITION, **_DIRECTION, "cone": [20.0, 30.0]},
     "directional": _DIRECTION,
     "rectangle": {**_POSITION, **_DIRECTION, "rotation": 0.0, "size": [0.5, 0.5]},
-    "mesh": {"material": ""},
+    "mesh": {"material": "", "image": None},
 }
-_ADDABLE = [kind for kind in get_args(LightKind) if kind != "mesh"]
 
 
 def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> dict[str, Any]:
@@ -60,12 +59,15 @@ def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> di
     return documents
 
 
-def complete_lights(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
+def complete_lights(
+    partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any], material_names: Collection[str]
+) -> dict[str, Any]:
     """Merge `partial` into the scene's lights and append the lights that it adds. Raises ParameterError.
 
     Args:
         default: default look of the scene.
         previous: a valid look; objects shared with it are not validated again.
+        material_names: materials of the scene.
     """
     pointer: Pointer = ("lights",)
     if not isinstance(partial, Mapping):
@@ -74,7 +76,24 @@ def complete_lights(partial: Any, default: Mapping[str, Any], previous: Mapping[
     if len(names) > MAX_LIGHTS:
         value = Description(f"an object with {len(names)} lights")
         raise invalid_value(pointer, value, f"at most {MAX_LIGHTS} lights, including the scene's own")
-    return {name: _complete_light(name, partial, default.get(name), previous.get(name)) for name in names}
+    lights = {name: _complete_light(name, partial, default.get(name), previous.get(name)) for name in names}
+    _check_materials(
+        {name: light for name, light in lights.items() if light["kind"] == "mesh"}, default, material_names
+    )
+    return lights
+
+
+def _check_materials(
+    mesh_lights: Mapping[str, Any], default: Mapping[str, Any], material_names: Collection[str]
+) -> None:
+    """Require that each mesh light that a look adds has a material of its own."""
+    used = {light["material"]: name for name, light in mesh_lights.items() if name in default}
+    for name in (name for name in mesh_lights if name not in default):
+        material, pointer = mesh_lights[name]["material"], ("lights", name, "material")
+        if not isinstance(material, str) or material not in material_names:
+            raise invalid_value(pointer, material, f"a material of this scene: {names_text(material_names)}")
+        if used.setdefault(material, name) != name:
+            raise invalid_value(pointer, material, f"another material: light {used[material]!r} is of this one")
 
 
 def _complete_light(name: str, lights: Mapping[str, Any], default: Any, previous: Any) -> Any:
@@ -94,11 +113,12 @@ def _base_fields(pointer: Pointer, partial: Mapping[str, Any], default: Mapping[
     """Values for omitted fields: those of the scene's light, or the defaults of a new kind."""
     kind = partial.get("kind", default["kind"] if default else None)
     if default is not None and kind == default["kind"]:
-        return default
+        return {**default_light(kind), **default}  # older stores lack some fields
     if default is not None and default["kind"] == "mesh":
         raise invalid_value((*pointer, "kind"), kind, "'mesh' for this emissive mesh; add a light with another name")
-    if kind not in _ADDABLE:
-        raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(_ADDABLE)}")
+    kinds = [name for name in _KIND_DEFAULTS if default is None or name != "mesh"]
+    if kind not in kinds:
+        raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(kinds)}")
     return default_light(kind)
 
 
@@ -139,6 +159,9 @@ def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, An
         case "material":
             if base["material"] not in ("", value):
                 raise invalid_value(pointer, value, f"{base['material']!r}: the scene decides which mesh emits")
+        case "image":
+            if value is not None:
+                check_image(pointer, value)
 
 
 def _check_pair(pointer: Pointer, value: Any, minimum: float, maximum: float) -> None:

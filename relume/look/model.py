@@ -116,7 +116,8 @@ class EnvironmentLook(_FrozenModel):
 
 class LightGeometry(NamedTuple):
     """Position and shape of a local light; fields that its kind lacks have their defaults. Lights with equal geometry
-    differ only by a factor for each channel. Fields as in the look."""
+    differ only by a factor for each channel. Fields as in the look; `channel`: the one of RGB that it emits, as a part
+    of a light that emits a colored image."""
 
     kind: LightKind
     position: Xyz = (0.0, 0.0, 0.0)
@@ -125,6 +126,8 @@ class LightGeometry(NamedTuple):
     rotation: float = 0.0
     size: tuple[float, float] = (0.0, 0.0)
     material: str = ""
+    image: str | None = None
+    channel: int | None = None
 
 
 class _LightLook(_FrozenModel):
@@ -186,10 +189,15 @@ class RectangleLook(_LightLook):
 
 
 class MeshLook(_LightLook):
-    """All surfaces of a material emit and are visible; emission is radiance."""
+    """All surfaces of a material emit and are visible; emission is radiance.
+
+    `image`: an uploaded image, "image:<id>", by which they emit: radiance is emission times its linear RGB. None: they
+    emit as in the scene.
+    """
 
     kind: Literal["mesh"]
     material: str
+    image: str | None = None
 
 
 LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]

@@ -61,14 +61,15 @@ def lights_bytes(scene: Scene, recipe: Recipe) -> int:
 
 
 def triangles_bytes(scene: Scene) -> int:
-    """Store size of the triangles: vertices, normals, material and mesh of each, image emission, and alpha masks."""
+    """Store size of the triangles: vertices, normals, UV coordinates, material, mesh, emission, and alpha masks."""
     bytes_per_face = 12 if has_emission_images(scene) else 8
     triangles = sum(
-        3 * mesh.positions.nbytes // 2 + mesh.faces.nbytes + bytes_per_face * len(mesh.faces) for mesh in scene.meshes
+        3 * mesh.positions.nbytes // 2 + mesh.uvs.nbytes + mesh.faces.nbytes + bytes_per_face * len(mesh.faces)
+        for mesh in scene.meshes
     )
     if not any(material.is_alpha_tested for material in scene.materials):
         return triangles
-    return triangles + sum(mesh.uvs.nbytes for mesh in scene.meshes) + opacity_bytes(scene)
+    return triangles + opacity_bytes(scene)
 
 
 def opacity_bytes(scene: Scene) -> int:
@@ -77,9 +78,9 @@ def opacity_bytes(scene: Scene) -> int:
     return images + len(scene.materials) * _ALPHA_MASK_BYTES
 
 
-def corner_bytes(scene: Scene) -> int:
-    """Store size of the vertices' UV coordinates, and of their tangents in half precision."""
-    return sum(mesh.uvs.nbytes + mesh.tangents.nbytes // 2 for mesh in scene.meshes)
+def tangent_bytes(scene: Scene) -> int:
+    """Store size of the vertices' tangents, in half precision."""
+    return sum(mesh.tangents.nbytes // 2 for mesh in scene.meshes)
 
 
 def texture_bytes(scene: Scene) -> int:

@@ -176,14 +176,10 @@ class ProbesMethod:
 
     def _bake_lights(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
         geometry = self._views.geometry_of(scene)
-        vertex_arrays: dict[str, NDArray[Any]] = {
-            "scene/uvs": geometry.uvs,
-            "scene/tangents": corner_tangents(scene, geometry),
-        }
         return {
             **light_arrays(scene, recipe),
             **triangle_arrays(geometry, scene),
-            **vertex_arrays,
+            "scene/tangents": corner_tangents(scene, geometry),
             **collect_textures(scene).arrays,
         }
 
@@ -271,7 +267,7 @@ def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
         patches=POINTS_PER_PATCH * num_patches * bits + num_patches * _PATCH_BYTES,
         nodes=(4 + _NODE_BYTES) * max_grid_nodes(triangles, recipe.num_probes),
         harmonics=harmonic_bytes(num_probes, num_patches),
-        triangles=triangles * 10 + plan_estimates.triangles_bytes(scene) + plan_estimates.corner_bytes(scene),
+        triangles=triangles * 10 + plan_estimates.triangles_bytes(scene) + plan_estimates.tangent_bytes(scene),
         lights=plan_estimates.lights_bytes(scene, recipe),
     )
 

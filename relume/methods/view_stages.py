@@ -4,7 +4,8 @@ The bake stores rays, not results: one visibility bit per view sample and light 
 triangles, and each view's samples), then "visibility" (rows of each view).
 
     scene/positions, normals, faces, face_material, face_mesh   triangles, for rays that looks require
-    scene/uvs, alpha_masks/…                             of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
+    scene/uvs                                            of the corners
+    alpha_masks/…                                        of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
     lights/environment                                   radiance, to weight it again
     lights/tiles                                         relume.lights.sphere_tiles.Tiles
     lights/nodes, direction, irradiance                  relume.lights.spherical_triangles.TriangleLights
@@ -16,6 +17,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
                                                          relume.raytrace.surface_interaction.SurfaceInteraction
     views/<k>/transmittance, camera, is_mirrored, mirror, mirror_cosine, mirror_tint
                                                          of scenes with glass or mirrors: relume.camera.view_samples
+    views/<k>/frost                                      of scenes with frosted glass: relume.camera.view_samples
     views/<k>/alpha_sample                               of scenes with tinted glass:
                                                          relume.raytrace.surface_points.SurfacePoints
     views/<k>/visibility                                 samples on surfaces only
@@ -31,6 +33,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.camera.refraction import glass_surfaces, has_frost
 from relume.camera.spectral_split import num_tints
 from relume.camera.specular_hits import MAX_MIRROR_BOUNCES
 from relume.camera.transparency_layers import has_layers
@@ -53,7 +56,7 @@ CHUNK_ROWS = 1024
 MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _EMISSION_BYTES, _NORMAL_MAP_BYTES = 12, 4 + 12
-_LAYER_BYTES = 12 + 12 + 1 + 4 + MAX_MIRROR_BOUNCES * (2 + 4 + 12)
+_LAYER_BYTES = 12 + 12 + 1 + 2 + 4 + MAX_MIRROR_BOUNCES * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks of the tracer
 _METADATA_BYTES = 1 << 20
 _RAY_NS, _TRIANGLE_US = 5.0, 2.0  # on one core, for scenes of 200 to a million triangles
@@ -144,6 +147,7 @@ class SampledViews:
             "double_sided": [material.double_sided for material in scene.materials],
             "has_alpha_test": any(material.is_alpha_tested for material in scene.materials),
             "has_layers": has_layers(scene.materials),
+            "frost": glass_surfaces(scene.materials).alpha.tolist(),
             "has_tints": num_tints(scene.materials) > 0,
             "has_emission_images": has_emission_images(scene),
             "roughness_levels": [list(levels_of_material(material)) for material in scene.materials],
@@ -223,6 +227,8 @@ def _columns(scene: Scene) -> list[str]:
     names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
     if has_layers(scene.materials):
         names += ["transmittance", "camera", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
+    if has_frost(scene.materials):
+        names.append("frost")
     if num_tints(scene.materials):
         names.append("alpha_sample")
     if has_emission_images(scene):
@@ -261,15 +267,12 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
 def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[Any]]:
     """Return the merged triangles of a scene, as arrays of a store."""
     arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
-    arrays["scene/normals"] = geometry.normals.astype(np.float16)
+    arrays |= {"scene/normals": geometry.normals.astype(np.float16), "scene/uvs": geometry.uvs}
     if has_emission_images(scene):
         arrays["scene/face_emission"] = relative_emission(scene)
     alpha_test = geometry.embree.alpha_test
     if alpha_test is not None:
-        arrays |= {
-            "scene/uvs": alpha_test.uvs,
-            **{f"alpha_masks/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()},
-        }
+        arrays |= {f"alpha_masks/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()}
     return arrays
 
 

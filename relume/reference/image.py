@@ -33,6 +33,7 @@ from relume.reference.roughness_classes import roughness_classes
 from relume.reference.textures import surface_roughness, surface_textures, with_overrides
 from relume.scene.model import Scene
 from relume.store.bake_protocol import Recipe
+from relume.views.frost_filter import make_frost_filter
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -274,5 +275,16 @@ def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:
     """Sum samples to pixels by their weights. (height, width, 3)"""
     width, height = size
     weighted = samples.throughput * radiance
-    pixels = [np.bincount(samples.pixel, weighted[:, c], width * height) for c in range(3)]
-    return np.stack(pixels, axis=-1).reshape(height, width, 3).astype(np.float32)
+    pixels = _sums(samples.pixel, weighted, width * height)
+    columns = samples.frost, samples.material, samples.pixel, samples.weight
+    frost = make_frost_filter(*columns, np.argsort(samples.pixel, kind="stable").astype(np.int32), width)
+    if frost is not None:
+        is_frosted = samples.frost > 0
+        frosted = _sums(samples.pixel[is_frosted], weighted[is_frosted], width * height)
+        pixels[frost.pixel] += frost.change @ frosted[frost.pixel]
+    return pixels.reshape(height, width, 3).astype(np.float32)
+
+
+def _sums(pixel: NDArray[np.uint32], values: F64, num_pixels: int) -> F64:
+    """Sum values of samples (n, 3) to pixels (num_pixels, 3)."""
+    return np.stack([np.bincount(pixel, values[:, c], num_pixels) for c in range(3)], axis=-1)

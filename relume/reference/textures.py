@@ -13,6 +13,7 @@ from relume.brdf.roughness_levels import uses_roughness_map
 from relume.brdf.texture_slots import ROUGHNESS, TEXTURES, roughness_image, user_images
 from relume.images.image_store import load_normal_map, load_roughness_map, load_texture, mean_roughness
 from relume.look import Look
+from relume.look.model import MeshLook
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Material, Mesh, Scene
@@ -23,25 +24,37 @@ F32 = NDArray[np.float32]
 
 
 def with_overrides(scene: Scene, look: Look) -> Scene:
-    """Apply the normal maps of a look to a scene, as if its file contained them.
+    """Apply the normal maps and emission images of a look to a scene, as if its file contained them.
 
     Args:
         scene: any. look: the look.
     """
-    normals = [look.materials[material.name].normals for material in scene.materials]
-    if not any(normals):
+    images = {light.material: light.image for light in look.lights.values() if isinstance(light, MeshLook)}
+    materials = tuple(_with_maps(material, look, images.get(material.name)) for material in scene.materials)
+    if all(material is own for material, own in zip(materials, scene.materials, strict=True)):
         return scene
-    materials = tuple(
-        material
-        if normal_map is None
-        else replace(material, normal_map=load_normal_map(normal_map), terms=_terms_with_roughness_map(material, look))
-        for material, normal_map in zip(scene.materials, normals, strict=True)
-    )
     meshes = tuple(
-        mesh if normals[mesh.material] is None or mesh.tangents.any() else _with_tangents(_with_uvs(mesh))
-        for mesh in scene.meshes
+        _with_corners(mesh, scene.materials[mesh.material], materials[mesh.material]) for mesh in scene.meshes
     )
     return replace(scene, materials=materials, meshes=meshes)
+
+
+def _with_maps(material: Material, look: Look, image: str | None) -> Material:
+    """Apply the maps of a look to a material. image: the image that it emits; None: as in the scene."""
+    normal_map = look.materials[material.name].normals
+    if normal_map is not None:
+        terms = _terms_with_roughness_map(material, look)
+        material = replace(material, normal_map=load_normal_map(normal_map), terms=terms)
+    if image is not None:
+        material = replace(material, textures={**material.textures, "emission": load_texture(image)})
+    return material
+
+
+def _with_corners(mesh: Mesh, own: Material, material: Material) -> Mesh:
+    """Add what the maps of a look need at the corners. own: the material in the scene."""
+    if material.normal_map is not own.normal_map and not mesh.tangents.any():
+        return _with_tangents(_with_uvs(mesh))
+    return mesh if material is own else _with_uvs(mesh)
 
 
 def _with_tangents(mesh: Mesh) -> Mesh:

@@ -77,12 +77,14 @@ class Glass:
         ior: index of refraction, in [1, 4].
         thickness: approximate thickness of a solid with this boundary, meters; 0 for a thin pane without refraction.
         absorbed: absorption coefficients inside a solid, per meter. Three numbers.
+        roughness: of the surface as the transmitted light shows it, in [0, 1]: square root of the width of GGX facets.
     """
 
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ior: float = 1.5
     thickness: float = 0.0
     absorbed: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    roughness: float = 0.0
 
 
 @dataclass(frozen=True)

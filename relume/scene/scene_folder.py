@@ -245,7 +245,8 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
 def _assemble_glass(document: dict[str, Any]) -> Glass:
     (red, green, blue), (r, g, b) = document["tint"], document["absorbed"]
     tint, absorbed = (float(red), float(green), float(blue)), (float(r), float(g), float(b))
-    return Glass(tint, float(document["ior"]), float(document["thickness"]), absorbed)
+    sizes = float(document["ior"]), float(document["thickness"])
+    return Glass(tint, *sizes, absorbed, float(document.get("roughness", 0.0)))
 
 
 def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], encoding: dict[str, Any] | None) -> Texture:

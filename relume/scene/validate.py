@@ -55,7 +55,7 @@ def check_glass(material: Material) -> None:
     are_fractions_valid = all(0 <= fraction <= 1 for fraction in glass.tint) and all(
         0 <= rate < np.inf for rate in glass.absorbed
     )
-    are_sizes_valid = 1 <= glass.ior <= MAX_IOR and 0 <= glass.thickness <= MAX_METERS
+    are_sizes_valid = 1 <= glass.ior <= MAX_IOR and 0 <= glass.thickness <= MAX_METERS and 0 <= glass.roughness <= 1
     if not (are_fractions_valid and are_sizes_valid and len(glass.tint) == len(glass.absorbed) == 3):
         raise SceneError(f"the glass parameters of material {material.name!r} are out of range; import the scene again")
 

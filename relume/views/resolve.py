@@ -14,6 +14,7 @@ from relume.core.errors import ParameterError
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.image_io.write_image import to_bytes
+from relume.views.frost_filter import FrostFilter
 from relume.views.view import Tile, View
 
 F32 = NDArray[np.float32]
@@ -91,7 +92,24 @@ def resolve(
     factors = np.array(np.broadcast_to(np.asarray(gain, np.float32), 3))
     args = (radiance, factors, view.first, view.order, throughput, view.width, table, offsets)
     parallel_for_chunks(lambda start, stop: _resolve_tiles(*args, start, stop, out), len(table))
+    if view.frost is not None:
+        change = factors * _frost_change(view, view.frost, radiance, throughput)
+        row = np.full(view.width * view.height, -1, np.int64)
+        for (x, y, width, height), offset in zip(table.tolist(), offsets.tolist(), strict=False):
+            tile_rows = np.arange(offset, offset + width * height).reshape(height, width)
+            row.reshape(view.height, view.width)[y : y + height, x : x + width] = tile_rows
+        row = row[view.frost.pixel]
+        out[row[row >= 0]] += change[row >= 0]
     return out
+
+
+def _frost_change(view: View, frost: FrostFilter, radiance: F32, throughput: F32) -> F32:
+    """Change of the pixels that show frosted glass by its filter. (p, 3)"""
+    num, order = len(frost.pixel), np.ascontiguousarray(view.order[frost.entry])
+    sums, tiles, ones = np.empty((num, 3), np.float32), np.array([[0, 0, num, 1]]), np.ones(3, np.float32)
+    factors = np.ascontiguousarray(throughput[frost.entry])
+    _resolve_tiles(radiance, ones, frost.first, order, factors, num, tiles, np.zeros(1, np.int64), 0, 1, sums)
+    return np.asarray(frost.change @ sums, np.float32)
 
 
 def encode(

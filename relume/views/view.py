@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -14,10 +14,11 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import RoughnessLevels
+from relume.brdf.texture_slots import EmissionImage
 from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.images.image_store import load_texture
+from relume.images.image_store import load_emission_image, load_texture
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.texture import sample_image
@@ -25,6 +26,7 @@ from relume.scene.model import Camera
 from relume.store.bake_protocol import StoreReader
 from relume.transport.outgoing_patch_light import no_light
 from relume.transport.shading_points import GatherRays, ShadingPoints
+from relume.views.frost_filter import REACH, FrostFilter, make_frost_filter
 from relume.views.gather_filter import make_neighbor_filter
 from relume.views.mirror_samples import MirrorSamples, read_mirror_samples
 from relume.views.store_io import (
@@ -64,6 +66,7 @@ class View:
         is_mirrored: surface samples on mirrors whose reflection is in other samples.
         textures: textures of each material, the scene's textures that are not 1 everywhere, by name. (n, 3)
         level: roughness levels, ascending within a material. ratios: ratios of each material's levels.
+        frost: filter of the samples behind frosted glass; None without any.
         maps: overridden maps of each material, see `relume.views.map_override`; empty if there are none.
         baked_rows: row of each surface sample in baked order; None: in that order.
         overridden: views of the same samples by overridden maps, as long as an image uses them.
@@ -88,6 +91,7 @@ class View:
     cos_theta_o: Shaped[NDArray[np.float64], " surface_samples"]
     level: Shaped[NDArray[np.uint8], " surface_samples"]
     ratios: tuple[tuple[float, ...], ...]
+    frost: FrostFilter | None = None
     maps: tuple[Hashable | None, ...] = ()
     baked_rows: Shaped[NDArray[np.int64], " surface_samples"] | None = field(default=None, repr=False)
     overridden: WeakValueDictionary[tuple[Hashable | None, ...], View] = field(
@@ -124,8 +128,14 @@ class View:
     def is_in_region(self, material: int, region: Tile) -> Shaped[NDArray[np.bool_], " n"]:
         """True for a material's samples in pixels of a region: x, y, width, height."""
         row, column = np.divmod(self.pixel[self.rows(material)].astype(np.int64), self.width)
-        x, y, width, height = region
-        return (column >= x) & (column < x + width) & (row >= y) & (row < y + height)
+        (x, y, width, height), reach = region, self._reach
+        is_in_columns = (column >= x - reach) & (column < x + width + reach)
+        return is_in_columns & (row >= y - reach) & (row < y + height + reach)
+
+    @property
+    def _reach(self) -> int:
+        """Pixels to each side of its own that a sample contributes to."""
+        return 0 if self.frost is None else REACH
 
     def roughness_levels(self, material: int) -> RoughnessLevels:
         """Roughness levels of a material's samples."""
@@ -141,17 +151,27 @@ class View:
         """
 
         def sample() -> F32:
-            rows = self.rows(material)
-            uv = read_uv(self.store, self.index, rows.start, rows.stop)
-            if uv is None:
-                raise StoreError("this bake is too old for uploaded images; bake the scene again")
-            return sample_image(load_texture(name), uv)
+            return sample_image(load_texture(name), self._uv(self.rows(material)))
 
         return self.cache.get_value((self.key, "image", *self.sample_key(material), name), sample)
 
-    def emissive(self, material: int) -> Shaped[F32, "n channels"]:
-        """Read the emission of a material's samples relative to its mean; 3 channels with emission textures, else 1."""
+    def _uv(self, rows: slice) -> Shaped[F32, "n 5"]:
+        uv = read_uv(self.store, self.index, rows.start, rows.stop)
+        if uv is None:
+            raise StoreError("this bake is too old for uploaded images; bake the scene again")
+        return uv
+
+    def emissive(self, material: int, image: EmissionImage | None = None) -> Shaped[F32, "n channels"]:
+        """Return the emission of a material's samples over its mean; 3 channels with emission images, else 1.
+
+        Args:
+            material: its index. image: emitted image of a look; None: the scene's own.
+        Raises:
+            NotFoundError, SceneError: the image cannot be loaded. StoreError: as `image`.
+        """
         rows = self.rows(material)
+        if image is not None:
+            return sample_image(load_emission_image(image), self._uv(rows))
         if not self.store.attributes.get("has_emission_images"):
             return np.ones((rows.stop - rows.start, 1), np.float32)
         return np.asarray(self.store.read(f"views/{self.index}/emission", rows.start, rows.stop), np.float32)
@@ -255,6 +275,15 @@ class View:
         """Read the radiance of the background samples."""
         return np.asarray(self.store.read(f"views/{self.index}/diffuse", self.num_surface_samples), np.float32)
 
+    def frosted_background(self) -> Iterator[tuple[float, Shaped[NDArray[np.intp], " k"]]]:
+        """Yield the width α of the facets of each frosted glass, and the background samples behind it."""
+        if self.frost is None:
+            return
+        frost = self.store.read(f"views/{self.index}/frost", self.num_surface_samples)
+        for index, alpha in enumerate(self.store.attributes["frost"]):
+            if alpha and len(rows := np.flatnonzero(frost == index + 1)):
+                yield alpha, rows
+
     def background_directions(self) -> Shaped[NDArray[np.float64], "n 3"]:
         """Read the unit directions of the background samples."""
         return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
@@ -298,8 +327,14 @@ class View:
         columns = -(-self.width // TILE_PIXELS)
         tiles = []
         for index in range(len(self.bounds) - 1):
-            pixel = self.pixel[self.rows(index)]
-            codes = pixel // self.width // TILE_PIXELS * columns + pixel % self.width // TILE_PIXELS
+            y, x = np.divmod(self.pixel[self.rows(index)].astype(np.int64), self.width)
+            steps = range(-self._reach, self._reach + 1, max(2 * self._reach, 1))
+            codes = [
+                np.clip(y + dy, 0, self.height - 1) // TILE_PIXELS * columns
+                + np.clip(x + dx, 0, self.width - 1) // TILE_PIXELS
+                for dy in steps
+                for dx in steps
+            ]
             tiles.append([self.all_tiles[code] for code in np.unique(codes)])
         return tiles
 
@@ -359,6 +394,7 @@ def open_view(
         first=np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))]).astype(np.int32),
         order=order,
         throughput=np.ascontiguousarray(throughput[order], np.float32),
+        frost=_frost_filter(store, prefix, pixel, order, width),
         origin=origin,
         mirrored=mirrored,
         is_mirrored=is_mirrored.astype(np.bool_, copy=False),
@@ -369,6 +405,15 @@ def open_view(
         maps=maps,
         baked_rows=rows,
     )
+
+
+def _frost_filter(
+    store: StoreReader, prefix: str, pixel: NDArray[np.uint32], order: NDArray[np.int32], width: int
+) -> FrostFilter | None:
+    if not any(store.attributes.get("frost", ())):
+        return None
+    frost, material, weight = (store.read(f"{prefix}/{name}") for name in ("frost", "material", "weight"))
+    return make_frost_filter(frost, material, pixel, weight, order, width)
 
 
 def _textures(store: StoreReader, prefix: str, start: int, stop: int) -> dict[str, F32]:

@@ -117,6 +117,15 @@ def test_an_image_of_a_saved_look_or_share_link_is_not_deleted(client, uploaded)
     assert client.get(f"{URL}/{uploaded['id']}").status_code == 200
 
 
+def test_an_image_that_a_look_emits_is_not_deleted(client, uploaded):
+    look = {"lights": {"Ball": {"kind": "mesh", "material": "Ball", "image": uploaded["texture"]}}}
+    assert client.put("/api/looks/glowing", json=look).status_code == 201
+    response = client.delete(f"{URL}/{uploaded['id']}")
+    assert response.status_code == 409
+    assert "look 'glowing'" in response.json()["detail"]
+    assert client.delete("/api/looks/glowing", headers={"If-Match": "*"}).status_code == 204
+
+
 def test_an_image_of_a_session_is_not_deleted_before_the_session(client, uploaded):
     resumes = client.app.state.services.live.resumes
     default = {"materials": {"Ball": {"terms": []}}}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
 from relume.brdf.albedo import Reflectance, Reflectances, material_reflectance
-from relume.brdf.texture_slots import NormalMap
+from relume.brdf.texture_slots import EmissionImage, NormalMap
 from relume.look import EnvironmentKey, LightGeometry, LightPaths, Look
 from relume.look.model import Rgb
 
@@ -20,6 +20,7 @@ Normals = tuple[NormalMap | None, ...]
 
 _UNIT_GAIN: Rgb = (1.0, 1.0, 1.0)
 _ZERO_GAIN: Rgb = (0.0, 0.0, 0.0)
+_NO_IMAGES: Mapping[str, EmissionImage] = MappingProxyType({})
 _MAX_CACHED_LIGHTS = 64  # every update strategy asks for the gains of a frame's lights, for every term
 
 
@@ -36,8 +37,8 @@ class Illumination(NamedTuple):
     Attributes:
         reflectances: reflectances of all materials, for indirect illumination; empty if that is not shown.
         paths: the light paths that are shown; indirect ones only if they were baked.
-        local: the lights with a gain above zero. environment_gain: per channel; 1 if there are no local lights, since
-            the gain then multiplies the finished image (`picture_gain`).
+        local: the lights with a gain above zero, and those that emit black images. environment_gain: per channel; 1 if
+            there are no local lights, since the gain then multiplies the finished image (`picture_gain`).
     """
 
     environment: EnvironmentKey
@@ -182,11 +183,42 @@ def _lit_local_lights(look: Look, solo_sources: frozenset[str] | None) -> Iterat
             yield LightSource(light.geometry, gain)
 
 
+def _emitted_parts(source: LightSource, images: Mapping[str, EmissionImage]) -> Iterator[LightSource]:
+    """Yield a light; one that emits an image with its mean color, and if it is colored, a light for each channel."""
+    geometry, gain = source
+    if geometry.image is None:
+        yield source
+        return
+    image = images[geometry.material]
+    red, green, blue = (g * mean for g, mean in zip(gain, image.mean, strict=True))
+    if not image.is_colored:
+        yield LightSource(geometry, (red, green, blue))
+        return
+    for channel, part in enumerate(((red, 0.0, 0.0), (0.0, green, 0.0), (0.0, 0.0, blue))):
+        yield LightSource(geometry._replace(channel=channel), part)
+
+
 def material_emission(light: Illumination, material: str) -> Rgb:
     """Return the radiance that the surfaces of a material emit toward the camera."""
     gains = [gain for geometry, gain in light.local if geometry.material == material and light.paths.direct]
     red, green, blue = (sum(channel) for channel in zip((0.0, 0.0, 0.0), *gains, strict=True))
     return red, green, blue
+
+
+def geometries(look: Look) -> Iterator[LightGeometry]:
+    """Yield the geometries of a look's lights."""
+    return (light.geometry for light in look.lights.values())
+
+
+def emission_images(
+    lights: Iterable[LightGeometry], find_image: Callable[[LightGeometry], EmissionImage | None]
+) -> Mapping[str, EmissionImage]:
+    """Return the images that lights emit, by material.
+
+    Args:
+        lights: their geometries. find_image: as `LocalLightTransport.emission_image`; its errors propagate.
+    """
+    return {light.material: image for light in lights if (image := find_image(light)) is not None}
 
 
 def is_same_environment(before: Illumination, after: Illumination) -> bool:
@@ -213,7 +245,12 @@ def with_baked_normals(light: Illumination) -> Illumination:
 
 
 def illumination_from_look(
-    look: Look, material_names: Sequence[str], *, has_bounces: bool, solo: Solo = None
+    look: Look,
+    material_names: Sequence[str],
+    *,
+    has_bounces: bool,
+    solo: Solo = None,
+    images: Mapping[str, EmissionImage] = _NO_IMAGES,
 ) -> Illumination:
     """Return the illumination of a look.
 
@@ -221,12 +258,14 @@ def illumination_from_look(
         material_names: in the scene's order. has_bounces: indirect light was baked.
         solo: names of the only sources that are shown, even if the look disables them; all others get gain zero. None,
             or names of which the look has none (as after one was removed): all enabled sources.
+        images: from `emission_images`; a light that emits one has its mean color.
     """
     paths = look.transport.paths
     if not has_bounces:
         paths = paths.without_reflections()
     solo_sources = _solo_sources(look, solo)
-    local = tuple(_lit_local_lights(look, solo_sources))
+    lit = _lit_local_lights(look, solo_sources)
+    local = tuple(part for source in lit for part in _emitted_parts(source, images))
     gain = _environment_gain(look, solo_sources) if local else (1.0, 1.0, 1.0)
     light = Illumination(look.environment.key, (), paths, local, gain)
     if not paths.has_indirect:

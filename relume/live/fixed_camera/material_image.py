@@ -10,7 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.specular import specular_albedo
-from relume.brdf.texture_slots import is_user_image
+from relume.brdf.texture_slots import EmissionImage, is_user_image
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.views.compose_terms import add_term
@@ -38,7 +38,7 @@ class MaterialImage:
         self.documents = list(documents)
         self._light = light
         self.terms = [LiveTerm(document, self._cos_theta_o, self._levels, light) for document in documents]
-        self._emission = (0.0, 0.0, 0.0)
+        self._emission: tuple[tuple[float, float, float], EmissionImage | None] = (0.0, 0.0, 0.0), None
         self._emission_pattern: F32 | None = None
         self._factor: F32 | None = None
         self._max_radiance: F32 | None = None
@@ -96,13 +96,24 @@ class MaterialImage:
         for term in self.terms:
             term.set_light(light, is_solo=is_solo)
 
-    def set_emission(self, emission: tuple[float, float, float], emission_pattern: Callable[[int], F32]) -> None:
-        """Set the emitted radiance, which multiplies `emission_pattern` of the material's samples, (n, 1 or 3)."""
-        if emission == self._emission:
+    def set_emission(
+        self,
+        emission: tuple[float, float, float],
+        image: EmissionImage | None,
+        emission_pattern: Callable[[int, EmissionImage | None], F32],
+    ) -> None:
+        """Set the emitted radiance.
+
+        Args:
+            emission: mean over the surfaces. image: emitted image of the look; None: they emit as in the scene.
+            emission_pattern: returns the emission of the material's samples over that mean, (n, 1 or 3).
+        """
+        if (emission, image) == self._emission:
             return
-        self._emission, self._is_current = emission, False
-        if self._emission_pattern is None:
-            self._emission_pattern = emission_pattern(self.index)
+        is_same_image = image == self._emission[1]
+        self._emission, self._is_current = (emission, image), False
+        if self._emission_pattern is None or not is_same_image:
+            self._emission_pattern = emission_pattern(self.index, image)
 
     def set_factor(
         self,
@@ -160,8 +171,8 @@ class MaterialImage:
             np.minimum(material_radiance, self._max_radiance, out=material_radiance)
         if self._unlit is not None:
             material_radiance += self._unlit
-        if self._emission_pattern is not None and any(self._emission):
-            material_radiance += np.array(self._emission, np.float32)[:, None] * self._emission_pattern.T
+        if self._emission_pattern is not None and any(self._emission[0]):
+            material_radiance += np.array(self._emission[0], np.float32)[:, None] * self._emission_pattern.T
         mirror_samples = self._view.mirrored
         if self._mirror_emission is not None and mirror_samples is not None:
             selection = mirror_samples.restrict_to(self._view.rows(self.index))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.brdf.lobe_sampling import LobeSampling
+    from relume.brdf.texture_slots import EmissionImage
     from relume.core.cache import Cache
     from relume.lights.spherical_triangles import TriangleLights
     from relume.live.fixed_camera.illumination import Illumination, LightSource
@@ -151,6 +152,10 @@ class LocalLightTransport(Protocol):
 
     def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
         """Return the unoccluded irradiance at points from a light of unit emission."""
+        ...
+
+    def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
+        """Return the image that a light's surfaces emit; None if they emit as in the scene."""
         ...
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relume.brdf.lobe_sampling import LobeSampling
 from relume.brdf.roughness_levels import uses_roughness_map
 from relume.brdf.term_validation import complete_term
-from relume.brdf.texture_slots import roughness_image
+from relume.brdf.texture_slots import EmissionImage, roughness_image
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -22,6 +22,8 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import (
     Illumination,
     Solo,
+    emission_images,
+    geometries,
     illumination_from_look,
     is_solo,
     material_emission,
@@ -155,7 +157,8 @@ class ViewImages:
     def set_look(self, look: Look, solo: Solo = None) -> None:
         """Set a new target for every term; `solo` restricts the light to some sources.
 
-        Raises what `FixedViewTransfer.environment_radiance` raises; then nothing has changed.
+        Raises what `FixedViewTransfer.environment_radiance` and `LocalLightTransport.emission_image` raise; then
+        nothing has changed.
         """
         light = self._illumination_from_look(look, solo)
         if light != self.light:
@@ -170,8 +173,10 @@ class ViewImages:
 
     def set_emission(self, light: Illumination) -> None:
         """Set the emission of surfaces in this light."""
+        images = emission_images((geometry for geometry, _ in light.local), self.transfer.local.emission_image)
         for name, material in self.by_name.items():
-            material.set_emission(material_emission(light, name), self._emission_pattern)
+            image = images.get(name)
+            material.set_emission(material_emission(light, name), image, self._emission_pattern)
 
     def update_mirrors(self, look: Look) -> list[int]:
         """Update the mirrors to the displayed documents; returns the materials whose specular albedo changed."""
@@ -213,12 +218,13 @@ class ViewImages:
         )
 
     def _illumination_from_look(self, look: Look, solo: Solo = None) -> Illumination:
-        has_bounces = EditAxis.BOUNCES in self.transfer.axes
-        return illumination_from_look(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
+        has_bounces, names = EditAxis.BOUNCES in self.transfer.axes, self.transfer.material_names
+        images = emission_images(geometries(look), self.transfer.local.emission_image)
+        return illumination_from_look(look, names, has_bounces=has_bounces, solo=solo, images=images)
 
-    def _emission_pattern(self, material: int) -> F32:
+    def _emission_pattern(self, material: int, image: EmissionImage | None) -> F32:
         """Emission of a material's samples relative to its mean; zero on sides that do not emit. (n, 1 or 3)"""
-        return self.transfer.is_emissive_at(self.view, material)[:, None] * self.view.emissive(material)
+        return self.transfer.is_emissive_at(self.view, material)[:, None] * self.view.emissive(material, image)
 
     def material_term(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
         """Return the material and the term of a pointer in the current look.

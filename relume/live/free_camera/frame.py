@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.texture_slots import NormalMap, user_images
+from relume.brdf.texture_slots import EmissionImage, NormalMap, user_images
 from relume.live.fixed_camera.illumination import Illumination, material_emission
 from relume.live.free_camera.antialiasing import resolve
 from relume.live.free_camera.background import ShadowCatcher, background_radiance, composite_over
@@ -97,6 +97,7 @@ class MaterialState(NamedTuple):
         terms: Sequence[Sequence[Mapping[str, Any]]],
         previous: Self | None = None,
         normals: Sequence[NormalMap | None] | None = None,
+        emission: Sequence[EmissionImage | None] | None = None,
         *,
         is_blocking: bool = True,
         traces_lobes: bool = False,
@@ -106,12 +107,13 @@ class MaterialState(NamedTuple):
         Args:
             terms: terms of each. previous: an earlier state, to reuse what has not changed.
             normals: normal-map overrides of each; None: none.
+            emission: emitted image of each; None: none.
             is_blocking: see `find_btf_materials`. traces_lobes: narrow terms are left to lobe rays.
         """
-        normal_maps = [None] * len(terms) if normals is None else normals
+        none = [None] * len(terms)
         overrides = tuple(
-            ProbeMapOverrides(user_images(material_terms), item)
-            for material_terms, item in zip(terms, normal_maps, strict=True)
+            ProbeMapOverrides(user_images(material_terms), normal_map, image)
+            for material_terms, normal_map, image in zip(terms, normals or none, emission or none, strict=True)
         )
         cached = previous.projected if previous is not None else [None] * len(terms)
         projected = [_project_terms(each, item, traces_lobes) for each, item in zip(terms, cached, strict=True)]

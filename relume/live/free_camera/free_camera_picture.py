@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from relume.core.errors import ParameterError, ResultUnavailableError
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, check_exists, parse_pointer
 from relume.live.fixed_camera.fidelity import Fidelity
-from relume.live.fixed_camera.illumination import Illumination, Solo, illumination_from_look, picture_gain
+from relume.live.fixed_camera.illumination import (
+    Illumination,
+    Solo,
+    emission_images,
+    geometries,
+    illumination_from_look,
+    picture_gain,
+)
 from relume.live.fixed_camera.jobs import Job, Priority
 from relume.live.fixed_camera.picture import Progress
 from relume.live.fixed_camera.view_images import material_documents
@@ -104,7 +111,9 @@ class FreeCameraPicture:
         """
         if active_pointer is not None:
             parse_pointer(active_pointer)
-        light = illumination_from_look(look, self._transfer.material_names, has_bounces=True, solo=solo)
+        names = self._transfer.material_names
+        images = emission_images(geometries(look), self._transfer.emission_image)
+        light = illumination_from_look(look, names, has_bounces=True, solo=solo, images=images)
         self._transfer.environment_map(light.environment.map)  # raises now if it is not available
         self._look, self._light, self._solo = look, light, solo
         self.correct(None)
@@ -389,10 +398,13 @@ class FreeCameraPicture:
             names = self._transfer.material_names
             normals = [look.materials[name].normals for name in names]
             terms = [material_documents(look, name) for name in names]
+            images = emission_images(geometries(look), self._transfer.emission_image)
+            emission = [images.get(name) for name in names]
             materials = MaterialState.from_terms(
                 terms,
                 previous,
                 normals,
+                emission,
                 is_blocking=not self._is_watched,
                 traces_lobes=self._current_lobe_scene() is not None,
             )

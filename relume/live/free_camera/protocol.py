@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.texture_slots import EmissionImage
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import OpenBake
@@ -19,7 +20,7 @@ from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLight
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.live.free_camera.texture_overrides import ProbeMapOverrides
-from relume.look import EnvironmentKey
+from relume.look import EnvironmentKey, LightGeometry
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.surface_points import SurfacePoints
@@ -44,6 +45,10 @@ class FreeCameraTransfer(OpenBake, Protocol):
     def embree(self) -> EmbreeScene: ...
     @property
     def has_alpha_tested_surfaces(self) -> bool: ...
+    def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
+        """Return the image that a light's surfaces emit; None if they emit as in the scene."""
+        ...
+
     @property
     def positions(self) -> Shaped[F32, "corners 3"]:
         """Positions of triangle corners, meters."""

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.texture_slots import Images, NormalMap
-from relume.images.image_store import load_normal_map, load_texture
+from relume.brdf.texture_slots import EmissionImage, Images, NormalMap
+from relume.images.image_store import load_emission_image, load_normal_map, load_texture
 from relume.probes.stored_scene import MAX_TEXTURE_SIDE, StoredScene, Textures, concatenate_textures
 from relume.raytrace.surface_interaction import triplanar_axes
 from relume.scene.model import WRAPS, Texture
@@ -19,15 +19,16 @@ F32 = NDArray[np.float32]
 
 
 class ProbeMapOverrides(NamedTuple):
-    """Overrides of a material: for each of `TEXTURES`, and of the normal map; None keeps the baked map."""
+    """Overrides of a material: of each of `TEXTURES`, the normal map, the emission image; None keeps the baked one."""
 
     images: Images = (None, None)
     normals: NormalMap | None = None
+    emission: EmissionImage | None = None
 
     @property
-    def columns(self) -> tuple[str | NormalMap | None, ...]:
+    def columns(self) -> tuple[str | NormalMap | EmissionImage | None, ...]:
         """The overrides as columns of `Textures.material_textures`."""
-        return *self.images, self.normals
+        return *self.images, self.normals, self.emission
 
 
 NO_OVERRIDES = ProbeMapOverrides()
@@ -80,7 +81,9 @@ def overridden_textures(
     )
 
 
-def _load_texture(name: str | NormalMap) -> Texture:
+def _load_texture(name: str | NormalMap | EmissionImage) -> Texture:
+    if isinstance(name, EmissionImage):
+        return load_emission_image(name)
     return load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -52,6 +53,7 @@ from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
+from relume.views.frost_filter import GLOW_WIDTH, MAX_FROSTED_RATIO, RAY_SPACING
 from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View, open_view
 
@@ -339,10 +341,29 @@ class BakedFixedViews:
         )
 
     def background_in(self, environment: EnvironmentKey, view: View) -> Shaped[NDArray[np.float32], "n 3"]:
-        """Return the radiance of a view's background samples."""
-        if environment == BAKED_ENVIRONMENT:
-            return view.background()
-        return self.environment_along(environment, view.background_directions())
+        """Return the radiance of a view's background samples; behind frosted glass, the mean about each ray."""
+        directions = view.background_directions()
+        is_baked = environment == BAKED_ENVIRONMENT
+        radiance = view.background() if is_baked else self.environment_along(environment, directions)
+        for alpha, rows in view.frosted_background():
+            turned = rotate_about_y(directions[rows], -environment.rotation).astype(np.float32)
+            radiance[rows] = sum(lookup(part, turned) for part in self._frosted_maps(environment.map, alpha))
+        return radiance
+
+    def _frosted_maps(self, name: str | None, alpha: float) -> tuple[F32, F32]:
+        """Return parts of an environment for rays through frosted glass: without bright lights, and these, wider.
+
+        The facets of glass with a width α rarely face a sun, which would be a few bright pixels.
+        """
+        owner = self.cache_owner(name)
+
+        def prefilter() -> tuple[F32, F32]:
+            radiance = downsampled(self.environment_radiance(name))
+            steady = np.minimum(radiance, MAX_FROSTED_RATIO * radiance.mean(axis=(0, 1)))
+            spacing, width = math.degrees(RAY_SPACING * alpha), math.degrees(GLOW_WIDTH * alpha)
+            return prefiltered(steady, spacing), prefiltered(radiance - steady, width)
+
+        return self.cache.transient.get_value((owner, "environment behind frost", name, alpha), prefilter)
 
     def environment_along(
         self, environment: EnvironmentKey, directions: Shaped[NDArray[np.float64], "n 3"], blur: float = 0

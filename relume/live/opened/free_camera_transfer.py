@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.texture_slots import EmissionImage
 from relume.core.cache import Cache
 from relume.core.jackknife import JackknifeEstimate
 from relume.lights.spherical_triangles import TriangleLights
@@ -145,6 +146,10 @@ class BakedFreeCamera:
         key = self.key, "map overrides on surfaces", overrides
         textures = self.cache.get_value(key, lambda: overridden_textures(self.stored_scene, self.positions, overrides))
         return replace(self.stored_scene, **textures._asdict())
+
+    def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
+        """Return the image that a light's surfaces emit. See `LocalLights.emission_image`."""
+        return self.light_transport.local.emission_image(geometry)
 
     @property
     def has_alpha_tested_surfaces(self) -> bool:

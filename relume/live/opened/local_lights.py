@@ -10,7 +10,10 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.texture_slots import EmissionImage
 from relume.core.cache import Cache
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.images.image_store import load_texture
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import (
     LightTriangles,
@@ -23,6 +26,7 @@ from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.look import LightGeometry
 from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
 from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.emission_image import ImageEmitter, image_emitter
 from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
 from relume.raytrace.moving_light import MovingLight, trace_moving_light
 from relume.raytrace.scene_buffers import is_front, ray_epsilon
@@ -180,13 +184,48 @@ class LocalLights:
     def _build_light(self, geometry: LightGeometry) -> LocalLight:
         if geometry.kind != "mesh":
             return prepare_local_lights(geometry)
-        material = list(self._store.attributes["materials"]).index(geometry.material)
-        face_mask = self._store.read("scene/face_material") == material
+        material, face_mask = self._emissive_faces(geometry.material)
+        if geometry.image is not None:
+            emitter = self._image_emitter(geometry.material, geometry.image)
+            relative_radiance = emitter.relative_radiance(geometry.channel)
+            triangles = LightTriangles(emitter.corners, relative_radiance, self._is_two_sided(material))
+            return prepare_local_lights(geometry, triangles)
         face_emission = np.ones(np.count_nonzero(face_mask), np.float32)
         if self._store.attributes.get("has_emission_images"):
             face_emission = self._store.read("scene/face_emission")[face_mask]
         corners = self.positions[self.faces[face_mask]]
         return prepare_local_lights(geometry, LightTriangles(corners, face_emission, self._is_two_sided(material)))
+
+    def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
+        """Return the image that a light's surfaces emit; None if they emit as in the scene.
+
+        Raises:
+            NotFoundError, SceneError: the image cannot be loaded. StoreError: the bake is too old for it.
+        """
+        if geometry.image is None:
+            return None
+        emitter = self._image_emitter(geometry.material, geometry.image)
+        return EmissionImage(geometry.image, emitter.mean, emitter.is_colored)
+
+    def _image_emitter(self, material: str, image: str) -> ImageEmitter:
+        def compute() -> ImageEmitter:
+            faces = self.faces[self._emissive_faces(material)[1]]
+            return image_emitter(load_texture(image), self.positions[faces], self._read_uvs()[faces])
+
+        return self._cache.get_value((self._key, "emission image", material, image), compute)
+
+    def _read_uvs(self) -> Shaped[F32, "vertices 2"]:
+        try:
+            return np.asarray(self._store.read("scene/uvs"), np.float32)
+        except ChunkDamagedError:
+            raise
+        except StoreError:
+            raise StoreError("this bake is too old for emission images; bake the scene again") from None
+
+    def _emissive_faces(self, material: str) -> tuple[int, Shaped[NDArray[np.bool_], " triangles"]]:
+        """Return the index of a material, and which triangles have it."""
+        index = list(self._store.attributes["materials"]).index(material)
+        return index, self._store.read("scene/face_material") == index
 
     def _is_two_sided(self, material: int) -> bool:
         return bool(self._store.attributes["double_sided"][material])

@@ -31,7 +31,6 @@ from relume.scene_io.gltf.texture_resampling import Raster
 from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, dielectric_reflectance, make_terms
 from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
 
-_MAX_CLEAR_ROUGHNESS = 0.1  # roughness up to which the blur of glass is negligible
 MAX_TEXTURE_TEXELS = 700_000_000  # of all materials of a scene, 3 bytes each
 
 
@@ -129,8 +128,6 @@ class MaterialReader:
     def _glass(self, surface: PbrSurface, extensions: MaterialExtensions, transmission: float, label: str) -> Glass:
         """Thin or solid glass: tinted by the base color, and absorbing inside a solid."""
         volume, ior = extensions.volume, extensions.ior.ior
-        if surface.roughness > _MAX_CLEAR_ROUGHNESS:
-            self._warnings.append(approximated(f"Frosted glass on {label} shows what's behind it sharp."))
         if not 1 <= ior <= MAX_IOR:
             message = f"The index of refraction {ior:g} of {label} is out of range; 1.5 is used."
             self._warnings.append(unsupported(message))
@@ -141,7 +138,7 @@ class MaterialReader:
         absorbed = -np.log(np.maximum(volume.attenuationColor, 1e-6)) / volume.attenuationDistance
         red, green, blue = np.clip(tint, 0, 1).tolist()
         r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
-        return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
+        return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b), surface.roughness)
 
     def _warn_coat_normals(self, coat: Clearcoat, label: str, *, has_normal_map: bool) -> None:
         """Warn if the coat has other normals than the base layer; a view sample has one normal for both."""

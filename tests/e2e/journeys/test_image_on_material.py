@@ -108,6 +108,29 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
     expect(page.get_by_text("use the OpenGL version")).to_be_visible()
 
 
+def test_an_image_of_emission_shines_and_lights_the_scene(editor: Editor, stripes: Path) -> None:
+    """Dropped on an object; its light is in the list of lights; taken off and undone."""
+    page = editor.page
+    editor.choose("Ball", 0)
+    chosen, plain = page.get_by_label("Emission map", exact=True), editor.pixels()
+    light = page.get_by_role("slider", name="Ball: intensity", exact=True)
+    assert drop_on_the_middle(editor, {"panel_emission.png": stripes}) == "Ball"
+    expect(chosen.locator("option:checked")).to_have_text("panel_emission")
+    expect(light).to_have_count(1)
+    editor.slider("Emission intensity").press("End")
+    bright = editor.pixels()
+    height, width, _ = bright.shape
+    assert (bright - plain)[height // 2, width // 2].max() > 20
+    assert (bright - plain).max(axis=2)[-height // 6 :].max() > 20  # the floor
+    for _ in range(2):
+        chosen.select_option("")
+        expect(light).to_have_count(0)
+        np.testing.assert_array_equal(editor.pixels(), plain)
+        page.get_by_role("button", name="Undo", exact=True).click()
+        expect(chosen.locator("option:checked")).to_have_text("panel_emission")
+        np.testing.assert_array_equal(editor.pixels(), bright)
+
+
 def test_images_that_are_dropped_together_are_one_step(
     editor: Editor, stripes: Path, bumps: Path, tmp_path: Path
 ) -> None:

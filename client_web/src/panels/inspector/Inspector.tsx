@@ -3,6 +3,7 @@ import { jsonPointer } from "../../state/document/pointer";
 import { editValue } from "../../edit/edit";
 import { history } from "../../edit/history";
 import { BaseColorImage } from "./images/BaseColorImage";
+import { EmissionImage } from "./images/EmissionImage";
 import { MetalnessImage } from "./images/MetalnessImage";
 import { NormalImage } from "./images/NormalImage";
 import { openLibrary } from "../library/libraryItems";
@@ -13,6 +14,7 @@ import { defaultLook, look } from "../../state/look";
 import { shownPanels } from "../../state/panelWidths";
 import { materialOf, models } from "../../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, selectedTerms } from "../../state/selection";
+import type { Term } from "../../protocol";
 import { IconButton } from "../../ui/IconButton";
 import { Section } from "../../ui/Section";
 import { AlbedoInfo } from "./AlbedoInfo";
@@ -45,6 +47,12 @@ function AddTerm({ material }: { material: string }) {
       ))}
     </select>
   );
+}
+
+/** Note about focused light, which no method computes. */
+function CausticsNote({ material, terms }: { material: string; terms: readonly Term[] }) {
+  if (materialOf(material)?.is_glass !== true && !terms.some(isMirror)) return null;
+  return <p class="aside">Light that glass or a curved mirror focuses (caustics) isn’t computed.</p>;
 }
 
 /** Makes a ground plane a shadow catcher, which shows the background darkened by shadows, or a visible surface. */
@@ -125,6 +133,7 @@ function MaterialInspector() {
       </header>
       <ShadowCatcherToggle material={material} />
       <GlassToggle material={material} />
+      <CausticsNote material={material} terms={selectedTerms.value} />
       {!isShadowCatcher && <BaseColorImage key={material} material={material} terms={selectedTerms.value} />}
       {!isShadowCatcher &&
         selectedTerms.value.map((term, index) => (
@@ -151,13 +160,14 @@ function MaterialInspector() {
       {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
       {!isShadowCatcher && <AddTerm material={material} />}
       {!isShadowCatcher && materialLook !== undefined && (
-        <Section title="Metalness and normals">
+        <Section title="Metalness, normals, emission">
           <MetalnessImage material={material} terms={selectedTerms.value} />
           <NormalImage
             material={material}
             materialLook={materialLook}
             mirrors={materialOf(material)?.terms.some(isMirror) === true}
           />
+          <EmissionImage material={material} />
         </Section>
       )}
     </div>

@@ -3,7 +3,7 @@ import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../../protocol";
 import { add, length, scale, subtract, roundComponents } from "./vector";
 
-/** Kinds that can be added; emissive meshes only come with a scene. */
+/** Kinds that can be added; emissive meshes come with a scene or an emission map. */
 export type AddedKind = Exclude<LightKind, "mesh">;
 
 interface LightKindLabels {

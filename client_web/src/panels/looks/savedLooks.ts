@@ -3,7 +3,7 @@ import { signal } from "@preact/signals";
 import { history } from "../../edit/history";
 import type { NamedLook } from "../../edit/history";
 import { ApiError, json, request } from "../../session/net/api";
-import type { Look, LookEntry } from "../../protocol";
+import type { Light, Look, LookEntry } from "../../protocol";
 import { scene } from "../../state/scene";
 import { lookThumbnail } from "../../state/thumbnails";
 import { reportErrors } from "../../ui/toasts";
@@ -22,9 +22,11 @@ const path = (name: string) => `/api/looks/${encodeURIComponent(name)}`;
 function fitsScene(look: Partial<Look>): boolean {
   const materialNames = new Set(scene.value?.materials.map((material) => material.name));
   const lightNames = new Set(scene.value?.lights);
+  const hasMesh = (name: string, light: Light) =>
+    lightNames.has(name) || (light.kind === "mesh" && light.image != null && materialNames.has(light.material));
   return (
     Object.keys(look.materials ?? {}).every((name) => materialNames.has(name)) &&
-    Object.entries(look.lights ?? {}).every(([name, light]) => light.kind !== "mesh" || lightNames.has(name))
+    Object.entries(look.lights ?? {}).every(([name, light]) => light.kind !== "mesh" || hasMesh(name, light))
   );
 }
 

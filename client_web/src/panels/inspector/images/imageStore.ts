@@ -2,16 +2,18 @@
 import { computed, signal } from "@preact/signals";
 import { isImageReference } from "../../../state/document/imageReference";
 import { jsonPointer } from "../../../state/document/pointer";
-import { editValue } from "../../../edit/edit";
+import { editValue, replaceLook } from "../../../edit/edit";
 import { history } from "../../../edit/history";
 import { deleteImage, listImages, addMetalness } from "../../../session/net/api";
 import { uploadImage } from "../../../session/net/upload";
 import type { ImageBody, MaterialLook, Term } from "../../../protocol";
+import { MAX_LIGHTS } from "../../../look.gen";
 import { defaultLook, look } from "../../../state/look";
 import { scene } from "../../../state/scene";
 import { selectMaterial } from "../../../state/selection";
 import { reportErrors, showNote } from "../../../ui/toasts";
 import { baseTexture, hasBaseColor, withBaseImage, withoutBaseImage } from "./baseColor";
+import { emittingLight, lightWithoutImage, meshLightOf } from "./emission";
 import { canBeMetal, metalnessOf, withoutMetalness } from "./metalness";
 import { withNormals, withoutNormals } from "./normals";
 import { withColorAndRoughness, withSet, type Slot } from "./textureSet";
@@ -28,6 +30,7 @@ export const imageUploadProgress = signal<string | null>(null);
 export const uploadedImages = computed(() => images.value.filter(({ metalness }) => metalness === null));
 
 const NO_COLOR = "This material has no base color. Add a diffuse or a GGX layer to use a base color texture.";
+const TOO_MANY_LIGHTS = `Limit of ${MAX_LIGHTS} lights reached. Remove one before a material emits an image.`;
 const NO_METAL = "Needs a diffuse layer and a GGX layer to use a metalness map.";
 
 /** Assigns an image to a material map. */
@@ -135,6 +138,24 @@ export function assignNormals(material: string, { texture, name }: ImageBody): v
   selectMaterial(material);
 }
 
+/** Make a material emit an image. */
+export function assignEmission(material: string, { texture, name }: ImageBody): void {
+  const emitter = emittingLight(look.value?.lights ?? {}, material, texture);
+  if (emitter === null) return showNote(TOO_MANY_LIGHTS);
+  history.endGesture();
+  editValue(`Emission · ${name}`, jsonPointer("lights", emitter.name), emitter.light);
+  selectMaterial(material);
+}
+
+/** Restore the original emission. */
+export function removeEmissionImage(material: string): void {
+  const emitter = meshLightOf(look.value?.lights ?? {}, material);
+  if (emitter === null) return;
+  history.endGesture();
+  const next = lightWithoutImage(emitter, defaultLook.value?.lights ?? {});
+  editValue("Remove emission map", jsonPointer("lights", emitter.name), next);
+}
+
 /** Restore the original normal map. */
 export function removeNormalMap(material: string): void {
   replaceMaterial("Remove normal map", material, (current) =>
@@ -178,6 +199,9 @@ export async function assignSet(
   if (!hasBaseColor(current.terms)) reject("base color", "the material has none");
   if (roughTermIndices(current.terms).length === 0) reject("roughness", "the material has none");
   if (!canBeMetal(current.terms)) reject("metalness", "needs a diffuse layer and a GGX layer");
+  const emissionImage = set.get("emission");
+  if (emissionImage !== undefined && emittingLight(look.value?.lights ?? {}, material, "") === null)
+    reject("emission", "there are too many lights");
   const metal = set.get("metalness") ?? (set.has("base color") ? metalnessImageOf(material) : undefined);
   const bare = set.has("base color") ? withoutMetalness(current.terms, ownTerms(material), imageOf) : current.terms;
   let terms = withColorAndRoughness(bare, set);
@@ -185,7 +209,13 @@ export async function assignSet(
   await loadImages(); // lists generated images before the look refers to them
   if (look.value?.materials[material] !== current)
     throw new Error("The material changed in the meantime. Drop the images again.");
-  if (set.size > 0) replaceMaterial(label, material, () => withSet(current, terms, set));
+  if (set.size === 0) return rejections;
+  const materials = { ...look.value.materials, [material]: withSet(current, terms, set) };
+  const emitter =
+    emissionImage === undefined ? null : emittingLight(look.value.lights, material, emissionImage.texture);
+  const lights = emitter === null ? look.value.lights : { ...look.value.lights, [emitter.name]: emitter.light };
+  history.endGesture();
+  replaceLook(`${material} · ${label}`, { ...look.value, materials, lights });
   return rejections;
 }
 

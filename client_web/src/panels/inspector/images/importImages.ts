@@ -4,6 +4,7 @@ import { reportErrors, showNote, showError } from "../../../ui/toasts";
 import { uploadImage } from "../../../session/net/upload";
 import type { ImageBody } from "../../../protocol";
 import {
+  assignEmission,
   loadImages,
   assignRoughnessAndMetalness,
   assignMetalness,
@@ -50,6 +51,7 @@ const ASSIGNMENTS: Record<string, { assign: AssignImage; as: string }> = {
   roughness: { assign: assignRoughness, as: "roughness map" },
   metal: { assign: assignMetalness, as: "metalness map" },
   normals: { assign: assignNormals, as: "normal map" },
+  emission: { assign: assignEmission, as: "emission map" },
   "roughness and metal": { assign: assignRoughnessAndMetalness, as: "roughness (green) and metalness (blue) map" },
 };
 
@@ -59,7 +61,6 @@ const UNSUPPORTED_MAPS: Record<string, string> = {
   height: "Height maps aren't supported; use a normal map instead.",
   "DirectX normals": "DirectX normal maps aren't supported; use the OpenGL version (green up).",
   occlusion: "AO maps aren't needed: occlusion is ray-traced.",
-  emission: "Emission is part of a bake: import the scene with its emission map and bake again.",
   opacity: "Opacity comes with the scene file.",
   specular: "Specular maps aren't supported; set Specular F0 instead.",
 };

@@ -5,7 +5,7 @@ import { isColorName, detectMap } from "./mapNames";
 import { withNormals } from "./normals";
 import { roughTermIndices, withRoughnessImage } from "./roughness";
 
-export type Slot = "base color" | "roughness" | "metalness" | "normals";
+export type Slot = "base color" | "roughness" | "metalness" | "normals" | "emission";
 
 /** A rejected file and the reason. */
 export interface RejectedFile {
@@ -13,7 +13,7 @@ export interface RejectedFile {
   reason: string;
 }
 
-const SLOT_ORDER: readonly Slot[] = ["base color", "roughness", "metalness", "normals"];
+const SLOT_ORDER: readonly Slot[] = ["base color", "roughness", "metalness", "normals", "emission"];
 
 export interface SetPlan {
   slots: Map<Slot, File>;
@@ -25,6 +25,7 @@ const SLOTS: Record<string, readonly Slot[]> = {
   roughness: ["roughness"],
   metal: ["metalness"],
   normals: ["normals"],
+  emission: ["emission"],
   "roughness and metal": ["roughness", "metalness"],
 };
 
@@ -34,7 +35,6 @@ const REASONS: Record<string, string> = {
   height: "height; use a normal map",
   "DirectX normals": "DirectX normals; use the OpenGL version",
   occlusion: "ambient occlusion; it is ray-traced",
-  emission: "emission; it is part of a bake",
   opacity: "opacity; it comes with the scene file",
   specular: "specular; set Specular F0",
 };
