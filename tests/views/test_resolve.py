@@ -8,8 +8,9 @@ import pytest
 from rgb9e5 import rgb9e5_pack, rgb9e5_unpack
 
 from relume.core.errors import ParameterError
+from relume.math.rgb9e5 import pack_rgb9e5
 from relume.scene.model import Camera
-from relume.views.resolve import encode, pack_rgb9e5, resolve
+from relume.views.resolve import encode, resolve
 from relume.views.view import View
 
 

@@ -16,6 +16,7 @@ from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
 from relume.brdf.albedo import Reflectances
 from relume.brdf.lobe_sampling import LobeSampling
+from relume.brdf.texture_slots import TEXTURES
 from relume.core.cache import Cache
 from relume.core.digest import digest
 from relume.core.errors import ParameterError, StoreError
@@ -29,9 +30,11 @@ from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import (
+    LobePatches,
     LobeTracer,
     choose_peaks,
     lobe_environment,
+    no_lobe_patches,
     only_broad,
     reflects_narrowly,
     tile_of_texels,
@@ -44,6 +47,7 @@ from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
+from relume.transport.hit_textures import textured_light
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
 from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
@@ -53,6 +57,7 @@ from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
+_SPECULAR = TEXTURES.index("specular")
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
@@ -253,22 +258,24 @@ class BakedFixedViews:
         is_canceled: Callable[[], bool],
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
-        pattern = self._lobe_tracer.pattern(lobe)
-        reflectances = light.reflectances if light.paths.has_all_bounces else ()
-        narrow = tuple(reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances)
-        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
-        tint, share = self._lobe_patches(reflectances)
-        footprint = samples.pixel_footprint(receivers)
-        surfaces = self._lobe_tracer.surfaces(reflectances if any(narrow) else (), tint)
+        tracer, pattern = self._lobe_tracer, self._lobe_tracer.pattern(lobe)
+        reflectances, images = light.reflectances, tuple(material.images for material in light.reflectances)
+        goes_on = light.paths.has_all_bounces and any(map(reflects_narrowly, reflectances))
+        digests = [reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances]
+        key = digest((pattern.num_rays, pattern.quantile.tobytes(), tuple(digests) if goes_on else (), images))
+        patches, footprint = self._lobe_patches(reflectances), samples.pixel_footprint(receivers)
+        surfaces = tracer.surfaces(reflectances if goes_on else (), patches.mean[_SPECULAR], images)
         trace_args = receivers, footprint, pattern, surfaces, is_canceled
-        hits = samples.lobe_hits(key, lambda: self._lobe_tracer.trace(*trace_args))
+        hits = samples.lobe_hits(key, lambda: tracer.trace(*trace_args))
         environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
-        light_args = self._patch_light(light, is_canceled), environment, share
+        outgoing = self._patch_light(light, is_canceled)
+        textured = textured_light(outgoing.isotropic, patches.unit_share, patches.mean, surfaces.textures.slots)
+        light_args = outgoing, textured, environment, patches.broad_share
         return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks)
 
-    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
-        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
-        return np.ones((NO_PATCH + 1, 3), np.float32), np.ones(NO_PATCH + 1, np.float32)
+    def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
+        """Return what lobe rays take from patches beside their light: there are none."""
+        return no_lobe_patches()
 
     def _lobe_environment(self, light: Illumination) -> tuple[LobeEnvironment, LobePeaks]:
         key, rotation = light.environment, light.environment.rotation

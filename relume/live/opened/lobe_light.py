@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -19,14 +20,26 @@ from relume.assets.environments.equirect import (
 from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
 from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS
-from relume.core.errors import StoreError
+from relume.brdf.texture_slots import TEXTURES, Images
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.images.image_store import load_texture
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.opened.retrace import NormalRetracer
 from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
+from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
+from relume.raytrace.surface_textures import (
+    TextureCoordinates,
+    Textures,
+    project_missing,
+    read_textures,
+    replace_textures,
+    texture_coordinates,
+)
 from relume.store.bake_protocol import StoreReader
+from relume.transport.hit_textures import NO_TEXTURES, HitTextures, hit_textures, row_of_slot
 from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
 from relume.transport.lobe_paths import LobeSurfaces
 from relume.transport.lobe_rays import LobeEnvironment
@@ -41,6 +54,26 @@ _MAX_LOBES = 255
 _WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
+
+
+class LobePatches(NamedTuple):
+    """What lobe rays take from patches beside their light.
+
+    Attributes:
+        mean: of each of `TEXTURES` on each patch.
+        unit_share: share of the terms with each texture in a patch's reflectance, divided by the mean.
+        broad_share: share of a patch's isotropic radiance that its narrow lobe does not reflect.
+    """
+
+    mean: Shaped[F32, "2 patches 3"]
+    unit_share: Shaped[F32, "2 patches 3"]
+    broad_share: Shaped[F32, " patches"]
+
+
+def no_lobe_patches() -> LobePatches:
+    """Return those of a scene without patches."""
+    shape = len(TEXTURES), NO_PATCH + 1, 3
+    return LobePatches(np.ones(shape, np.float32), np.zeros(shape, np.float32), np.ones(NO_PATCH + 1, np.float32))
 
 
 class LobeTracer:
@@ -75,17 +108,19 @@ class LobeTracer:
         points_args = receivers.points, receivers.wo, footprint, receivers.level
         return trace_lobe_rays(self._tracer.geometry, self._lookup, surfaces, *points_args, pattern, is_canceled)
 
-    def surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"]) -> LobeSurfaces:
-        """Return the surfaces that rays go on from: those with narrow lobes.
+    def surfaces(
+        self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: Sequence[Images]
+    ) -> LobeSurfaces:
+        """Return the surfaces that rays meet.
 
         Args:
-            reflectances: of all materials. Empty: rays end at the first surface.
-            tint: mean of the specular texture of each patch.
+            reflectances: of all materials; those with narrow lobes pass rays on. Empty: none do.
+            tint: mean of the specular texture of each patch. images: of the look, for each material.
         """
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
         materials = [index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]
         found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
-        row = np.full(len(reflectances), -1, np.int32)
+        row = np.full(len(self._store.attributes["materials"]), -1, np.int32)
         row[materials] = np.arange(len(materials))
         quantile, band_density = (
             _padded([lobe.quantile[0] for lobe, _ in found]),
@@ -107,8 +142,43 @@ class LobeTracer:
             ),
             blur=np.asarray(np.where(median > _WIDE, _BLUR * median, 0), np.float32),
             tint=tint,
+            textures=(textures := self.textures(images)),
+            specular=row_of_slot(textures.slots, TEXTURES.index("specular")),
+            glass=self._glass,
             offset=geometry.epsilon,
         )
+
+    def textures(self, images: Sequence[Images]) -> HitTextures:
+        """Return the textures of all surfaces. images: of the look, for each material"""
+        if self._textures is None:
+            return NO_TEXTURES
+        baked, coordinates = self._textures
+        textures, geometry = replace_textures(baked, images, load_texture), self._tracer.geometry
+        has_texture = (textures.material_textures[:, : len(TEXTURES)] >= 0).any(axis=1)
+        mesh_args = geometry.positions, geometry.faces, geometry.face_normals, has_texture[geometry.face_material]
+        return hit_textures(textures, project_missing(coordinates, *mesh_args))
+
+    @cached_property
+    def _textures(self) -> tuple[Textures, TextureCoordinates] | None:
+        """Textures as baked, and their coordinates; None for a store without them."""
+        geometry = self._tracer.geometry
+        try:
+            textures, uvs = read_textures(self._store), self._store.read("scene/uvs")
+        except ChunkDamagedError:
+            raise
+        except StoreError:
+            return None
+        return textures, texture_coordinates(uvs, geometry.positions, geometry.faces)
+
+    @cached_property
+    def _glass(self) -> Shaped[F32, "materials 4"]:
+        """Glass of all materials, see `LobeSurfaces`."""
+        alpha_test = self._tracer.geometry.embree.alpha_test
+        if alpha_test is None or not np.any(alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE):
+            return np.empty((0, 4), np.float32)
+        row, rules = alpha_test.alpha_masks.material_rule, alpha_test.alpha_masks.rules
+        is_glass = (row >= 0) & (rules[row, 0] == GLASS_RULE)
+        return np.where(is_glass[:, None], rules[row, 1:5], np.float32(-1))
 
     @cached_property
     def _normals(self) -> F32:
