@@ -85,6 +85,7 @@ class LobeTracer:
 
     def __init__(self, store: StoreReader, tracer: NormalRetracer) -> None:
         self._store, self._tracer = store, tracer
+        self._textures_with = lru_cache(maxsize=1)(self._replace_textures)  # a look's are as large as the baked ones
 
     def pattern(self, lobe: LobeSampling) -> LobePattern:
         """Return the rays of every sample: fewer for a narrow lobe."""
@@ -109,7 +110,7 @@ class LobeTracer:
         return trace_lobe_rays(self._tracer.geometry, self._lookup, surfaces, *points_args, pattern, is_canceled)
 
     def surfaces(
-        self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: Sequence[Images]
+        self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: tuple[Images, ...]
     ) -> LobeSurfaces:
         """Return the surfaces that rays meet.
 
@@ -118,6 +119,7 @@ class LobeTracer:
             tint: mean of the specular texture of each patch. images: of the look, for each material.
         """
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
+        textures = self._textures_with(images)
         materials = [index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]
         found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
         row = np.full(len(self._store.attributes["materials"]), -1, np.int32)
@@ -142,13 +144,13 @@ class LobeTracer:
             ),
             blur=np.asarray(np.where(median > _WIDE, _BLUR * median, 0), np.float32),
             tint=tint,
-            textures=(textures := self.textures(images)),
+            textures=textures,
             specular=row_of_slot(textures.slots, TEXTURES.index("specular")),
             glass=self._glass,
             offset=geometry.epsilon,
         )
 
-    def textures(self, images: Sequence[Images]) -> HitTextures:
+    def _replace_textures(self, images: tuple[Images, ...]) -> HitTextures:
         """Return the textures of all surfaces. images: of the look, for each material"""
         if self._textures is None:
             return NO_TEXTURES
