@@ -1,9 +1,9 @@
 """sharp.rmse_checker: a chrome ball over a checkered floor beside a pane of tinted glass, against Mitsuba.
 
 The checks are a texture of the floor, 16 × 16 on 3 m; a pane of thin green glass stands between the ball and a white
-wall. The sky is overcast: the mirror image of a sun would outweigh the floor. Method `gather`, all light, exact image
-of 640×480; errors as those of `relume_bench.sharp`, over the pixels of the ball. Mitsuba's path tracer has the same
-texture and its own thin glass.
+wall. The environment is overcast, because the mirror image of a sun would outweigh the floor. Method `gather`, all
+light, exact image of 640×480; errors as those of `relume_bench.sharp`, over the pixels of the ball. Mitsuba's path
+tracer has the same texture and its own thin glass.
 """
 
 from __future__ import annotations
@@ -84,14 +84,14 @@ def checkered_scene() -> Scene:
         rectangle((0.45, 0.01, 0.6), (0, 0, -1.0), (0, 0.8, 0)).mesh("Glass", 3),
     ]
     camera = look_at(sharp.VIEW, (-0.3, 0.9, 2.6), (0.0, 0.4, 0.0), float(np.radians(34.0)))
-    return make_scene("checkered floor", meshes, materials, [camera], _overcast_sky())
+    return make_scene("checkered floor", meshes, materials, [camera], _overcast_environment())
 
 
-def _overcast_sky() -> Environment:
+def _overcast_environment() -> Environment:
     """Three times as bright at the zenith as at the horizon, as the CIE's; dim below it."""
     height = texel_directions(128, 256)[..., 1:2]
     radiance = np.where(height > 0, 0.4 * (1 + 2 * height), 0.1) * [0.9, 0.97, 1.0]
-    return Environment("overcast sky", radiance.astype(np.float32))
+    return Environment("overcast", radiance.astype(np.float32))
 
 
 def _checks() -> NDArray[np.float32]:

@@ -274,7 +274,7 @@ class BakedFixedViews:
         return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks)
 
     def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
-        """Return what lobe rays take from patches beside their light: there are none."""
+        """Return the textures and reflectances of patches, for lobe rays: there are none."""
         return no_lobe_patches()
 
     def _lobe_environment(self, light: Illumination) -> tuple[LobeEnvironment, LobePeaks]:

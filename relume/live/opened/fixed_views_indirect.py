@@ -121,7 +121,7 @@ class BakedIndirectViews(BakedFixedViews):
         return self.indirect.outgoing_light(light, is_canceled) if light.paths.has_indirect else no_light()
 
     def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
-        """Return what lobe rays take from patches beside their light."""
+        """Return the textures and reflectances of patches, for lobe rays."""
         out, material, num = super()._lobe_patches(reflectances), self.patches.material, self.patches.num_patches
         if reflectances:
             of_material = np.stack([reflectance.matrix[:, :, 0] for reflectance in reflectances], axis=1)[:, material]

@@ -57,7 +57,7 @@ _NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
 
 
 class LobePatches(NamedTuple):
-    """What lobe rays take from patches beside their light.
+    """Textures and reflectances of patches, for lobe rays.
 
     Attributes:
         mean: of each of `TEXTURES` on each patch.
@@ -71,7 +71,7 @@ class LobePatches(NamedTuple):
 
 
 def no_lobe_patches() -> LobePatches:
-    """Return those of a scene without patches."""
+    """Return the textures and reflectances of a scene without patches."""
     shape = len(TEXTURES), NO_PATCH + 1, 3
     return LobePatches(np.ones(shape, np.float32), np.zeros(shape, np.float32), np.ones(NO_PATCH + 1, np.float32))
 
