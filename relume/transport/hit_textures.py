@@ -24,6 +24,7 @@ from relume.raytrace.texture_kernels import sample_texture
 F32 = NDArray[np.float32]
 
 _ONE = np.float32(1)
+_WHITE = np.uint32(0x84020100)  # packed ones
 
 
 class HitTextures(NamedTuple):
@@ -122,9 +123,8 @@ def look_up_textures(packet, hit_textures, face_material, lanes):  # type: ignor
         texture_v = w * coordinates.uvs[a, 1] + u * coordinates.uvs[b, 1] + v * coordinates.uvs[c, 1]
         for row in range(slots.shape[0]):
             texture = textures.material_textures[face_material[face], slots[row]]
-            if texture < 0:
-                value[0] = value[1] = value[2] = _ONE
-            else:
+            lanes.texture[row, k] = _WHITE
+            if texture >= 0:
                 footprint = lanes.spread[k] * lanes.distance[k] * coordinates.scale[face]
                 sample_texture(textures, texture, texture_u, texture_v, footprint, value)
-            lanes.texture[row, k] = pack_rgb9e5(value[0], value[1], value[2])
+                lanes.texture[row, k] = pack_rgb9e5(value[0], value[1], value[2])

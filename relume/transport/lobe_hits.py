@@ -166,6 +166,43 @@ def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_
     return num_valid
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, hits, paths, end):  # type: ignore[no-untyped-def]
+    """Trace all rays of points [first, first + width), the same ray of all at once.
+
+    Args:
+        packet, lanes: memory. aim: shift and level of each lane.
+        points, wo, footprint, lookup, surfaces, pattern, hits, paths: as in `_trace`. end: number of paths so far.
+    Returns:
+        New number of paths.
+    """
+    (patch, escapes, texture), (shifts, levels) = hits, aim
+    has_glass, num_rays = surfaces.glass.shape[0] > 0, patch.shape[1]
+    follows = surfaces.quantile.shape[0] > 0 or has_glass
+    _load_points(points, first, width, packet)
+    for ray in range(num_rays):
+        if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
+            continue
+        trace_hits(packet)
+        for k in range(LANES):
+            lanes.distance[k] = 0
+        look_up_hits(packet, ray, lookup, surfaces, lanes)
+        for k in range(width):
+            face = get_hit(packet, k)[0]
+            is_escaping = packet.is_active[k] != 0 and face < 0
+            escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
+            for row in range(texture.shape[0]):
+                texture[row, first + k, ray] = lanes.texture[row, k]
+            passes_glass = packet.is_active[k] != 0 and face >= 0 and is_glass(surfaces, face)
+            patch[first + k, ray] = NO_PATCH if passes_glass else lanes.patches[k]
+        if follows:
+            before = end
+            end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
+            if end > before:
+                _load_points(points, first, width, packet)
+    return end
+
+
 @nb.njit(nogil=True, cache=True)
 def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, start, stop, hits, paths):  # type: ignore[no-untyped-def]
     """Trace all rays of points [start, stop), the same ray of `LANES` points at once.
@@ -178,10 +215,8 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
     Returns:
         Number of paths.
     """
-    (patch, escapes, texture), packet, lanes, end = hits, new_packet(tracer), allocate_lanes(), 0
+    packet, lanes, end = new_packet(tracer), allocate_lanes(), 0
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
-    has_glass, num_rays = surfaces.glass.shape[0] > 0, patch.shape[1]
-    follows = surfaces.quantile.shape[0] > 0 or has_glass
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for k in range(LANES):
@@ -189,26 +224,10 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
             levels[k], lanes.seeds[k] = level[min(p, level.shape[0] - 1)], points.seed[p]
             shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
             lanes.spread[k] = _ray_spacing(pattern, levels[k], half_vector_spread(footprint, p))
-        _load_points(points, first, width, packet)
-        for ray in range(num_rays):
-            if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
-                continue
-            trace_hits(packet)
-            lanes.distance[:] = 0
-            look_up_hits(packet, ray, lookup, surfaces, lanes)
-            for k in range(width):
-                face = get_hit(packet, k)[0]
-                is_escaping = packet.is_active[k] != 0 and face < 0
-                escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
-                for row in range(texture.shape[0]):
-                    texture[row, first + k, ray] = lanes.texture[row, k]
-                passes_glass = packet.is_active[k] != 0 and face >= 0 and is_glass(surfaces, face)
-                patch[first + k, ray] = NO_PATCH if passes_glass else lanes.patches[k]
-            if follows:
-                before = end
-                end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
-                if end > before:
-                    _load_points(points, first, width, packet)
+        end = _trace_packet(
+            packet, lanes, (shifts, levels), points, wo, footprint, lookup, surfaces, pattern, first, width, hits,
+            paths, end,
+        )  # fmt: skip
     return end
 
 

@@ -214,13 +214,13 @@ TINT = (0.2, 0.9, 0.5)
 
 @pytest.fixture(scope="module")
 def glazed():
-    """The floor of patch 5 below two panes of tinted glass of patch 7, and the ceiling of patch 9 above a half."""
+    """The floor of patch 5 below two sheets of tinted glass of patch 7, and the ceiling of patch 9 above a half."""
     terms = ({"model": "lambert"},)
     materials = Material("A", terms), Material("B", terms), Material("C", terms, glass=Glass(TINT))
     scene = make_tiny_scene(
         quad("floor", [[-5, 0, 5], [5, 0, 5], [5, 0, -5], [-5, 0, -5]], 0),
         quad("ceiling", [[0, 1, 5], [5, 1, 5], [5, 1, -5], [0, 1, -5]], 1),
-        *(quad(f"pane {y}", [[-9, y, 9], [9, y, 9], [9, y, -9], [-9, y, -9]], 2) for y in (0.3, 0.4)),
+        *(quad(f"sheet {y}", [[-9, y, 9], [9, y, 9], [9, y, -9], [-9, y, -9]], 2) for y in (0.3, 0.4)),
         camera=make_camera("front", [0, 4, 0.01], [0, 0, 0], 0.1),
         environment=np.ones((8, 16, 3), "f"),
         materials=materials,
