@@ -98,4 +98,4 @@ def _checks() -> NDArray[np.float32]:
     """The checks as a texture. (height, width, 3)"""
     check = np.arange(_CHECKS * _TEXELS) // _TEXELS
     is_light = (check[:, None] + check) % 2 == 0
-    return np.where(is_light[..., None], np.float32(_LIGHT_CHECK), np.float32(_DARK_CHECK))
+    return np.where(is_light[..., None], _LIGHT_CHECK, _DARK_CHECK).astype(np.float32)

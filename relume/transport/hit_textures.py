@@ -18,7 +18,7 @@ from relume.brdf.texture_slots import TEXTURES
 from relume.core.numba_options import NO_REFCOUNT
 from relume.math.rgb9e5 import pack_rgb9e5
 from relume.raytrace.ray_packet import LANES, get_hit, get_uv
-from relume.raytrace.surface_textures import TextureCoordinates, Textures
+from relume.raytrace.surface_textures import EMISSION, TextureCoordinates, Textures
 from relume.raytrace.texture_kernels import sample_texture
 
 F32 = NDArray[np.float32]
@@ -99,7 +99,20 @@ def textured_light(
     by_texture = np.where(stored, isotropic * unit_share, 0).astype(np.float32)
     plain = isotropic - (by_texture * mean).sum(axis=0)
     per_specular = np.where(stored[1], 1 / mean[1], 1).astype(np.float32)
-    return TexturedLight(plain, *by_texture, per_specular, *(row_of_slot(slots, slot) for slot in range(len(TEXTURES))))
+    diffuse, specular = row_of_slot(slots, 0), row_of_slot(slots, 1)
+    return TexturedLight(plain, by_texture[0], by_texture[1], per_specular, diffuse, specular)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _texture_uv(packet, k, face, coordinates):  # type: ignore[no-untyped-def]
+    """Texture coordinates at a lane's hit, a tuple."""
+    u, v = get_uv(packet, k)
+    a, b, c = coordinates.faces[face, 0], coordinates.faces[face, 1], coordinates.faces[face, 2]
+    w = _ONE - u - v
+    return (
+        w * coordinates.uvs[a, 0] + u * coordinates.uvs[b, 0] + v * coordinates.uvs[c, 0],
+        w * coordinates.uvs[a, 1] + u * coordinates.uvs[b, 1] + v * coordinates.uvs[c, 1],
+    )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -116,15 +129,27 @@ def look_up_textures(packet, hit_textures, face_material, lanes):  # type: ignor
         face = get_hit(packet, k)[0] if packet.is_active[k] != 0 else np.int32(-1)
         if face < 0:
             continue
-        u, v = get_uv(packet, k)
-        a, b, c = coordinates.faces[face, 0], coordinates.faces[face, 1], coordinates.faces[face, 2]
-        w = _ONE - u - v
-        texture_u = w * coordinates.uvs[a, 0] + u * coordinates.uvs[b, 0] + v * coordinates.uvs[c, 0]
-        texture_v = w * coordinates.uvs[a, 1] + u * coordinates.uvs[b, 1] + v * coordinates.uvs[c, 1]
+        u, v = _texture_uv(packet, k, face, coordinates)
         for row in range(slots.shape[0]):
             texture = textures.material_textures[face_material[face], slots[row]]
             lanes.texture[row, k] = _WHITE
             if texture >= 0:
                 footprint = lanes.spread[k] * lanes.distance[k] * coordinates.scale[face]
-                sample_texture(textures, texture, texture_u, texture_v, footprint, value)
+                sample_texture(textures, texture, u, v, footprint, value)
                 lanes.texture[row, k] = pack_rgb9e5(value[0], value[1], value[2])
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def emission_image(packet, k, face, material, hit_textures, lanes):  # type: ignore[no-untyped-def]
+    """Value of the emission image at a lane's hit, packed; ones without an image.
+
+    Args:
+        packet: traced rays. k: the lane. face, material: of its hit. hit_textures: `HitTextures`. lanes: `RayLanes`.
+    """
+    textures, coordinates, _ = hit_textures
+    image = textures.material_textures[material, EMISSION] if textures.material_textures.shape[0] > 0 else -1
+    if image < 0:
+        return _WHITE
+    (u, v), value = _texture_uv(packet, k, face, coordinates), lanes.texel
+    sample_texture(textures, image, u, v, lanes.spread[k] * lanes.distance[k] * coordinates.scale[face], value)
+    return pack_rgb9e5(value[0], value[1], value[2])

@@ -30,13 +30,14 @@ from relume.raytrace.ray_packet import (
     set_origin,
     trace_hits,
 )
-from relume.transport.hit_textures import NO_TEXTURES, HitTextures, look_up_textures
+from relume.transport.hit_textures import NO_TEXTURES, HitTextures, emission_image, look_up_textures
 from relume.transport.patch_lookup import locate_smoothly, tangents_of
 
 F32 = NDArray[np.float32]
 
 MAX_REFLECTIONS = 4
 _MAX_SIDES = 8  # of glass
+NO_EMITTER = np.uint16(65535)
 END, ESCAPE, REFLECTION, TRANSMISSION = np.uint8(0), np.uint8(1), np.uint8(2), np.uint8(3)
 """Kinds of entries in `LobePaths`."""
 
@@ -53,6 +54,8 @@ class LobePaths(NamedTuple):
             environment light directly.
         patch: patch of the end or reflection, `NO_PATCH` for none. lobe: row in `LobeSurfaces` of the newest lobe.
         texture: at the end, see `relume.transport.hit_textures`.
+        emitter: material of the end if it may emit light to this side after a reflection, else `NO_EMITTER`: the
+            samples of local lights are the light before any. emission: its image there, packed.
         throughput: product of the albedos and transmittances so far.
         direction: of the newest ray; of a reflection its wo, world space.
         normal: of a reflection.
@@ -64,6 +67,8 @@ class LobePaths(NamedTuple):
     patch: Shaped[NDArray[np.uint16], " K"]
     lobe: Shaped[NDArray[np.uint8], " K"]
     texture: Shaped[NDArray[np.uint32], "K slots"]
+    emitter: Shaped[NDArray[np.uint16], " K"]
+    emission: Shaped[NDArray[np.uint32], " K"]
     throughput: Shaped[F32, "K 3"]
     direction: Shaped[F32, "K 3"]
     normal: Shaped[F32, "K 3"]
@@ -71,10 +76,14 @@ class LobePaths(NamedTuple):
     @classmethod
     def allocate(cls, num_points: int, num_entries: int, num_slots: int) -> LobePaths:
         """Allocate memory for entries."""
-        (ray, patch), (kind, lobe) = np.empty((2, num_entries), np.uint16), np.empty((2, num_entries), np.uint8)
+        (ray, patch, emitter), (kind, lobe) = (
+            np.empty((3, num_entries), np.uint16),
+            np.empty((2, num_entries), np.uint8),
+        )
         vectors = np.empty((3, num_entries, 3), np.float32)
-        texture = np.empty((num_entries, num_slots), np.uint32)
-        return cls(np.zeros(num_points + 1, np.int64), ray, kind, patch, lobe, texture, *vectors)
+        texture, emission = np.empty((num_entries, num_slots), np.uint32), np.empty(num_entries, np.uint32)
+        first = np.zeros(num_points + 1, np.int64)
+        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, *vectors)
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
         """Select the paths of some points."""
@@ -103,6 +112,7 @@ class LobeSurfaces(NamedTuple):
         textures: of all surfaces. specular: row of the specular texture among those of a hit, −1 for none.
         glass: transmittance of each material for red, green and blue without reflectance, −1 if it is opaque, and the
             reflectance at normal incidence; no rows for a scene without glass.
+        is_two_sided: of each material, whether it emits to both sides.
         offset: of ray origins from surfaces, meters.
     """
 
@@ -120,6 +130,7 @@ class LobeSurfaces(NamedTuple):
     textures: HitTextures
     specular: int
     glass: Shaped[F32, "materials 4"]
+    is_two_sided: Shaped[NDArray[np.bool_], " materials"]
     offset: float
 
     @property
@@ -145,6 +156,7 @@ NO_SURFACES = LobeSurfaces(
     textures=NO_TEXTURES,
     specular=-1,
     glass=np.empty((0, 4), np.float32),
+    is_two_sided=np.empty(0, np.bool_),
     offset=0.0,
 )
 """Of a scene in which all rays end at the first surface."""
@@ -229,6 +241,8 @@ def _store(paths, entry, point, ray, kind, patch, lanes, k, direction):  # type:
     """Write an entry of paths, with the point in `first`; the rest is that of lane k."""
     paths.first[entry], paths.ray[entry], paths.kind[entry], paths.patch[entry] = point, ray, kind, patch
     paths.lobe[entry] = lanes.lobe[k]
+    is_lit = kind == END and lanes.lobe[k] >= 0
+    paths.emitter[entry], paths.emission[entry] = lanes.emitter[k] if is_lit else NO_EMITTER, lanes.emission[k]
     for row in range(paths.texture.shape[1]):
         paths.texture[entry, row] = lanes.texture[row, k]
     for axis in range(3):
@@ -252,6 +266,22 @@ def look_up_hits(packet, ray, lookup, surfaces, lanes):  # type: ignore[no-untyp
         if packet.is_active[k] != 0 and face >= 0:
             lanes.distance[k] += distance
     look_up_textures(packet, surfaces.textures, surfaces.face_material, lanes)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _look_up_emission(packet, k, face_normal, surfaces, lanes):  # type: ignore[no-untyped-def]
+    """Find the material that may emit light at a lane's hit, and its image. See `LobePaths`."""
+    face, _ = get_hit(packet, k)
+    lanes.emitter[k] = NO_EMITTER
+    if face < 0:
+        return
+    material = surfaces.face_material[face]
+    facing = np.float32(0)
+    for axis in range(3):
+        facing += face_normal[face, axis] * get_direction(packet, k, axis)
+    if facing < 0 or surfaces.is_two_sided[material]:
+        lanes.emitter[k] = material
+        lanes.emission[k] = emission_image(packet, k, face, material, surfaces.textures, lanes)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
@@ -305,7 +335,7 @@ def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, 
                 lanes.num_reflections[k] += 1
                 random = ray_jitter(ray + lanes.num_reflections[k] * num_rays, lanes.seeds[k])
                 goes_on = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput, lanes.normal)
-                lobes[k], last[k], lanes.is_path[k] = lobe, NO_PATCH, True
+                lobes[k], last[k], lanes.is_path[k], lanes.emitter[k] = lobe, NO_PATCH, True, NO_EMITTER
                 if surfaces.blur[lobe] > 0 and k < width:
                     _store(paths, end, first + k, ray, REFLECTION, patch, lanes, k, view)
                     end += 1
@@ -318,6 +348,7 @@ def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, 
         for k in range(LANES):
             if packet.is_active[k] != 0:
                 last[k], has_escaped[k] = lanes.patches[k], get_hit(packet, k)[0] < 0
+                _look_up_emission(packet, k, lookup.normals, surfaces, lanes)
     for k in range(width):
         if lanes.is_path[k]:
             direction = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)

@@ -93,6 +93,7 @@ class LobePeaks(NamedTuple):
     visible: Shaped[F32, "patches K"]
 
 
+NO_EMISSION = np.empty((0, 3), np.float32)
 NO_PEAKS = LobePeaks(np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), np.empty((0, 0), np.float32))
 
 
@@ -107,6 +108,7 @@ class LobeRays:
         broad_share: share of each patch's isotropic radiance that its narrow lobe does not reflect.
         footprint: of each point, see `trace_lobe_rays`.
         surfaces: that rays go on from. peaks: of the environment.
+        emission: radiance of each material's surfaces, which surfaces with narrow lobes reflect; empty for none.
     """
 
     hits: LobeHits
@@ -118,6 +120,7 @@ class LobeRays:
     footprint: Shaped[F32, "#n 2 2 3"]
     surfaces: LobeSurfaces
     peaks: LobePeaks
+    emission: Shaped[F32, "materials 3"]
 
     @property
     def max_rays_per_point(self) -> int:
@@ -132,7 +135,14 @@ class LobeRays:
     def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
         r, point_args = receivers, (self.footprint, _levels(receivers))
-        light_args = (self.outgoing, self.textured), self.broad_share, self.environment, self.surfaces, self.peaks
+        light_args = (
+            (self.outgoing, self.textured),
+            self.broad_share,
+            self.environment,
+            self.surfaces,
+            self.peaks,
+            self.emission,
+        )
         hits = self.hits.patch, self.hits.escapes, self.hits.texture, self.hits.paths
         return int(_list_lobe_rays(r.points, r.wo, *point_args, hits, self.pattern, light_args, start, stop, listed))
 
@@ -317,11 +327,12 @@ def _from_peaks(peaks, surfaces, lobe, patch, n, o):  # type: ignore[no-untyped-
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _along_path(paths, first, last, patches, environment, surfaces, peaks, direct):  # type: ignore[no-untyped-def]
+def _along_path(paths, first, last, patches, environment, surfaces, peaks, emission, direct):  # type: ignore[no-untyped-def]
     """Radiance that the entries [first, last) of a path bring to its ray.
 
     Args:
-        patches: outgoing and textured light of `LobeRays`. direct: radiance of the environment along the ray.
+        patches: outgoing and textured light of `LobeRays`. emission: of `LobeRays`.
+        direct: radiance of the environment along the ray.
     """
     outgoing, textured = patches
     red = green = blue = _ZERO
@@ -339,6 +350,14 @@ def _along_path(paths, first, last, patches, environment, surfaces, peaks, direc
             light = direct
         elif patch != NO_PATCH:
             light = _from_patch(outgoing, textured, patch, _texels(textured, paths.texture[entry]), direction)
+        emitter = paths.emitter[entry]
+        if emitter < emission.shape[0]:
+            image = unpack_rgb9e5(paths.emission[entry])
+            light = (
+                light[0] + emission[emitter, 0] * image[0],
+                light[1] + emission[emitter, 1] * image[1],
+                light[2] + emission[emitter, 2] * image[2],
+            )
         red += paths.throughput[entry, 0] * light[0]
         green += paths.throughput[entry, 1] * light[1]
         blue += paths.throughput[entry, 2] * light[2]
@@ -352,12 +371,12 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) footprint: of `LobeRays`. level: roughness levels, or one.
         hits: the fields of `LobeHits`. pattern: of `LobeRays`.
-        light_args: its outgoing and textured, broad_share, environment, surfaces and peaks.
+        light_args: its outgoing and textured, broad_share, environment, surfaces, peaks and emission.
         listed: `ListedRays`, written.
     Returns:
         K, the number of rays.
     """
-    (patch, escapes, texture, paths), (patches, broad_share, environment, surfaces, peaks) = hits, light_args
+    (patch, escapes, texture, paths), (patches, broad_share, environment, surfaces, peaks, emission) = hits, light_args
     outgoing, textured = patches
     wi, end, has_environment = listed.wi, 0, environment.radiance.shape[0] > 0
     is_direct = has_environment and environment.is_direct
@@ -389,7 +408,7 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
                 jitter = ray_jitter(ray, points.seed[p])
                 light = _from_environment(environment, pattern, point_level, spread, (t, b, n), world, jitter, o)
             if is_path:
-                light = _along_path(paths, first_entry, path, patches, environment, surfaces, peaks, light)
+                light = _along_path(paths, first_entry, path, patches, environment, surfaces, peaks, emission, light)
                 red, green, blue = _isotropic(textured, hit, _texels(textured, texture[:, p, ray]))
                 share = broad_share[hit]
                 light = light[0] + share * red, light[1] + share * green, light[2] + share * blue

@@ -55,6 +55,7 @@ class RayLanes(NamedTuple):
         num_reflections: so far. is_path: whether the ray went on from its first hit.
         spread: width of a ray's footprint by the length of its path. distance: this length, meters.
         texture: of the newest hit, see `relume.transport.hit_textures`. texel: memory for a lookup.
+        emitter, emission: of the newest hit, as in `LobePaths`.
     """
 
     seeds: Shaped[NDArray[np.uint32], " lanes"]
@@ -72,6 +73,8 @@ class RayLanes(NamedTuple):
     distance: Shaped[F32, " lanes"]
     texture: Shaped[NDArray[np.uint32], "slots lanes"]
     texel: Shaped[F32, " 3"]
+    emitter: Shaped[NDArray[np.uint16], " lanes"]
+    emission: Shaped[NDArray[np.uint32], " lanes"]
 
 
 @nb.njit(nogil=True, cache=True)
@@ -83,6 +86,7 @@ def allocate_lanes():  # type: ignore[no-untyped-def]
         np.zeros((3, LANES), np.float32), np.zeros((3, LANES), np.float32), np.zeros(LANES, np.bool_),
         np.zeros(LANES, np.int32), np.zeros(LANES, np.bool_), np.zeros(LANES, np.float32), np.zeros(LANES, np.float32),
         np.zeros((_MAX_SLOTS, LANES), np.uint32), np.zeros(3, np.float32),
+        np.zeros(LANES, np.uint16), np.zeros(LANES, np.uint32),
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from relume.raytrace.tangents import any_tangent
 from relume.scene.model import Glass, Material, Texture
 from relume.transport.hit_textures import NO_TEXTURES, hit_textures
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits, lobe_ray_in_pixel, trace_lobe_rays
-from relume.transport.lobe_paths import END, ESCAPE, NO_SURFACES, REFLECTION, TRANSMISSION, LobeSurfaces
+from relume.transport.lobe_paths import END, ESCAPE, NO_EMITTER, NO_SURFACES, REFLECTION, TRANSMISSION, LobeSurfaces
 from relume.transport.patch_lookup import PatchLookup
 
 NUM = 200
@@ -108,6 +108,7 @@ def polished_ceiling(blur=0.0):
         textures=NO_TEXTURES,
         specular=-1,
         glass=np.empty((0, 4), np.float32),
+        is_two_sided=np.array([False, False]),
         offset=1e-4,
     )
 
@@ -127,6 +128,10 @@ def test_rays_go_on_from_polished_surfaces(geometry, lookup, points):
     assert set(paths.patch[ends & (paths.patch != NO_PATCH)]) == {5}
     point = np.repeat(np.arange(NUM), np.diff(paths.first))
     assert np.all(hits.patch[point, paths.ray] == 9)
+    # the floor may emit upward, and what escapes may not
+    assert set(paths.emitter[ends & (paths.patch == 5)]) == {0}
+    assert set(paths.emitter[~ends]) == {NO_EMITTER}
+    np.testing.assert_allclose(rgb9e5_unpack(paths.emission[ends & (paths.patch == 5)]), 1)
 
 
 def test_wide_lobes_store_where_they_are_lit(geometry, lookup, points):
@@ -234,6 +239,7 @@ def glazed():
         face_material=geometry.face_material,
         lobe=np.full(3, -1, np.int32),
         glass=np.array([[-1] * 4, [-1] * 4, [*TINT, 0.04]], np.float32),
+        is_two_sided=np.zeros(3, np.bool_),
         offset=geometry.epsilon,
     )
     return geometry, lookup, surfaces

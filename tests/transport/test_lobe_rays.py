@@ -22,8 +22,8 @@ from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
 from relume.transport.hit_textures import textured_light
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
-from relume.transport.lobe_paths import NO_SURFACES, no_paths
-from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeRays
+from relume.transport.lobe_paths import END, NO_EMITTER, NO_SURFACES, LobePaths, no_paths
+from relume.transport.lobe_rays import NO_EMISSION, NO_ENVIRONMENT, NO_PEAKS, LobeRays
 from relume.transport.outgoing_patch_light import isotropic, no_light
 from relume.transport.shading.shader import Shader
 from relume.transport.shading_points import build_ray_lists
@@ -66,7 +66,7 @@ def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotat
     tile = tile_of_texels(tiles, radiance.shape[:2], rotation)
     environment = lobe_environment(radiance, tile, rotation, lights, radiance, is_direct=True)
     patches = no_light(), untextured(no_light())
-    rays = LobeRays(hits, pattern, *patches, environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+    rays = LobeRays(hits, pattern, *patches, environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION)
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), visible)
     return lights, ref.only_above(replace(points, rays=(rays,)), lights)
@@ -161,7 +161,7 @@ def test_rays_that_hit_a_patch_bring_its_light():
     hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), no_texture, no_paths(NUM_POINTS))
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
     patches = isotropic(light), untextured(isotropic(light))
-    rays = LobeRays(hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+    rays = LobeRays(hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION)
     listed = build_ray_lists(rays, points, 0, NUM_POINTS)
     num = int(listed.first[-1])
     assert 0.99 * 27 * NUM_POINTS < num <= 27 * NUM_POINTS  # few leave below the horizon
@@ -189,13 +189,50 @@ def test_rays_bring_the_light_of_a_patch_times_the_texture_by_its_mean():
 
     def listed(textured):
         patches = isotropic(light), textured
-        rays = LobeRays(hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+        rays = LobeRays(
+            hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION
+        )
         lists = build_ray_lists(rays, points, 0, NUM_POINTS)
         return lists.irradiance[:, : int(lists.first[-1])].copy()
 
     plain = listed(untextured(isotropic(light)))
     textured = listed(textured_light(light, unit_share, mean, np.array([0, 1])))
     np.testing.assert_allclose(textured, plain * factor[:, None], rtol=0.01)
+
+
+def test_polished_surfaces_reflect_lights_with_their_images():
+    """Every other path of a ray ends on a light."""
+    chrome, (normal, wo) = document("ggx", roughness=0.1, f0=1.0), view(40)
+    pattern = make_lobe_pattern(sample_lobe(chrome, NO_LEVELS), 55, 3)
+    points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
+    paths = LobePaths.allocate(NUM_POINTS, NUM_POINTS * 55, 0)
+    paths.first[:] = 55 * np.arange(NUM_POINTS + 1)
+    paths.ray[:] = np.tile(np.arange(55), NUM_POINTS)
+    paths.kind[:], paths.patch[:], paths.lobe[:] = END, NO_HIT, 0
+    paths.emitter[:] = np.where(paths.ray % 2, NO_EMITTER, 1)
+    paths.emission[:] = rgb9e5_pack(np.float32([0.5, 1, 2]))
+    paths.throughput[:] = 0.5
+    light = np.zeros((65_536, 3), np.float32)
+    light[7] = 1
+
+    def listed(patch_light, paths, emission):
+        hits = LobeHits(
+            np.full((NUM_POINTS, 55), 7, np.uint16), np.zeros((NUM_POINTS, 7), np.uint8),
+            np.empty((0, NUM_POINTS, 55), np.uint32), paths,
+        )  # fmt: skip
+        patches = isotropic(patch_light), untextured(isotropic(patch_light))
+        rays = LobeRays(
+            hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, emission
+        )
+        lists = build_ray_lists(rays, points, 0, NUM_POINTS)
+        return lists.irradiance[:, : int(lists.first[-1])].copy()
+
+    weight = listed(light, no_paths(NUM_POINTS), NO_EMISSION)[0]
+    reflected = listed(np.zeros_like(light), paths, np.float32([[9, 9, 9], [10, 20, 40]]))
+    is_lit = reflected[0] > 0
+    assert 0.49 < is_lit.mean() < 0.52
+    np.testing.assert_allclose(reflected[:, is_lit], np.outer([2.5, 10, 40], weight[is_lit]), rtol=1e-5)
+    assert not reflected[:, ~is_lit].any()
 
 
 def test_rows_keep_their_rays():

@@ -58,7 +58,8 @@ def overridden_textures(
     coordinates = project_missing(
         baked, positions, stored_scene.faces, stored_scene.face_normal, is_overridden[stored_scene.face_material]
     )
-    textures = replace_textures(stored_scene.textures, [override.columns for override in overrides], _load_texture)
+    names: list[tuple[str | NormalMap | None, ...]] = [override.columns for override in overrides]
+    textures = replace_textures(stored_scene.textures, names, _load_texture)
     uvs, uv_faces, uv_scale = coordinates
     has_normal_map = np.array([override.normals is not None for override in overrides])
     return OverriddenTextures(

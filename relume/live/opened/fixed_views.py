@@ -49,7 +49,7 @@ from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.hit_textures import textured_light
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
-from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
+from relume.transport.lobe_rays import NO_EMISSION, NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
@@ -271,7 +271,16 @@ class BakedFixedViews:
         outgoing = self._patch_light(light, is_canceled)
         textured = textured_light(outgoing.isotropic, patches.unit_share, patches.mean, surfaces.textures.slots)
         light_args = outgoing, textured, environment, patches.broad_share
-        return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks)
+        emission = self._mesh_emission(light) if goes_on else NO_EMISSION
+        return LobeRays(hits, pattern, *light_args, footprint, surfaces, peaks, emission)
+
+    def _mesh_emission(self, light: Illumination) -> Shaped[F32, "materials 3"]:
+        """Return the radiance of the surfaces of each material that is a light; its image is relative to it."""
+        emission = np.zeros((len(self.material_names), 3), np.float32)
+        for geometry, gain in light.local:
+            if geometry.kind == "mesh":
+                emission[self.material_names.index(geometry.material)] += np.array(gain, np.float32)
+        return emission
 
     def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
         """Return the textures and reflectances of patches, for lobe rays: there are none."""

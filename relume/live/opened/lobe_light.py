@@ -147,6 +147,7 @@ class LobeTracer:
             textures=textures,
             specular=row_of_slot(textures.slots, TEXTURES.index("specular")),
             glass=self._glass,
+            is_two_sided=np.array(self._store.attributes["double_sided"], np.bool_),
             offset=geometry.epsilon,
         )
 
@@ -179,7 +180,7 @@ class LobeTracer:
         if alpha_test is None or not np.any(alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE):
             return np.empty((0, 4), np.float32)
         row, rules = alpha_test.alpha_masks.material_rule, alpha_test.alpha_masks.rules
-        is_glass = (row >= 0) & (rules[row, 0] == GLASS_RULE)
+        is_glass = np.asarray((row >= 0) & (rules[row, 0] == GLASS_RULE))
         return np.where(is_glass[:, None], rules[row, 1:5], np.float32(-1))
 
     @cached_property
