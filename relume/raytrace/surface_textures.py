@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.texture_slots import TEXTURES
+from relume.brdf.texture_slots import TEXTURES, NormalMap
 from relume.core.errors import ChunkDamagedError, StoreError
+from relume.images.image_store import load_normal_map, load_texture
 from relume.raytrace.surface_interaction import triplanar_axes
 from relume.raytrace.texture import MipMap
 from relume.scene.model import WRAPS, Scene, Texture
 from relume.store.bake_protocol import StoreReader
 
 F32 = NDArray[np.float32]
-_Name = TypeVar("_Name")
 
 MAX_TEXTURE_SIDE = 2048  # finer mip levels are not stored
 _MAX_TEXELS = 1 << 25  # of all finest levels together; 12 bytes each
@@ -149,19 +149,22 @@ def concatenate_textures(textures: Iterable[Texture], max_side: int = MAX_TEXTUR
     )
 
 
-def replace_textures(
-    textures: Textures, names: Sequence[Sequence[_Name | None]], load: Callable[[_Name], Texture]
-) -> Textures:
+MapName = str | NormalMap
+"""Of an image in a look."""
+
+
+def replace_textures(textures: Textures, names: Sequence[Sequence[MapName | None]]) -> Textures:
     """Replace textures of materials by those of a look.
 
     Args:
         textures: as baked. names: for each material, of the first columns of `material_textures`; None keeps one.
-        load: returns the texture of a name.
+    Raises:
+        NotFoundError, SceneError: an image cannot be loaded.
     """
     distinct = list(dict.fromkeys(name for row in names for name in row if name is not None))
     if not distinct:
         return textures
-    loaded = list(map(load, distinct))
+    loaded = [load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name) for name in distinct]
     added = concatenate_textures(loaded, MAX_TEXTURE_SIDE)
     wraps = [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in loaded]
     material_textures = textures.material_textures.copy()
@@ -193,7 +196,11 @@ class TextureCoordinates(NamedTuple):
 def texture_coordinates(
     uvs: Shaped[F32, "corners 2"], positions: Shaped[F32, "corners 3"], faces: Shaped[NDArray[np.uint32], "faces 3"]
 ) -> TextureCoordinates:
-    """Return the texture coordinates of triangles. uvs, positions: of their corners"""
+    """Return the texture coordinates of triangles.
+
+    Args:
+        uvs, positions: of the corners. faces: indices of the triangles' corners.
+    """
     a, b, c = positions[faces].transpose(1, 0, 2)
     twice_area = np.maximum(np.linalg.norm(np.cross(b - a, c - a), axis=1), 1e-20)
     (du_0, dv_0), (du_1, dv_1) = (uvs[faces][:, k].T - uvs[faces][:, 0].T for k in (1, 2))

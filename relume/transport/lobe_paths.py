@@ -75,7 +75,11 @@ class LobePaths(NamedTuple):
 
     @classmethod
     def allocate(cls, num_points: int, num_entries: int, num_slots: int) -> LobePaths:
-        """Allocate memory for entries."""
+        """Allocate memory for entries.
+
+        Args:
+            num_points: points of the paths. num_entries: entries. num_slots: textures of each.
+        """
         (ray, patch, emitter), (kind, lobe) = (
             np.empty((3, num_entries), np.uint16),
             np.empty((2, num_entries), np.uint8),

@@ -10,10 +10,8 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import Images, NormalMap
-from relume.images.image_store import load_normal_map, load_texture
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.surface_textures import TextureCoordinates, Textures, project_missing, replace_textures
-from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
 
@@ -58,17 +56,12 @@ def overridden_textures(
     coordinates = project_missing(
         baked, positions, stored_scene.faces, stored_scene.face_normal, is_overridden[stored_scene.face_material]
     )
-    names: list[tuple[str | NormalMap | None, ...]] = [override.columns for override in overrides]
-    textures = replace_textures(stored_scene.textures, names, _load_texture)
+    textures = replace_textures(stored_scene.textures, [override.columns for override in overrides])
     uvs, uv_faces, uv_scale = coordinates
     has_normal_map = np.array([override.normals is not None for override in overrides])
     return OverriddenTextures(
         textures, uvs, uv_faces, uv_scale, _tangents(stored_scene, positions, uvs[uv_faces], has_normal_map)
     )
-
-
-def _load_texture(name: str | NormalMap) -> Texture:
-    return load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name)
 
 
 def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, has_normal_map: NDArray[np.bool_]) -> F32:

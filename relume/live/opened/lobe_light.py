@@ -22,7 +22,6 @@ from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS
 from relume.brdf.texture_slots import TEXTURES, Images
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.images.image_store import load_texture
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.opened.retrace import NormalRetracer
@@ -156,7 +155,7 @@ class LobeTracer:
         if self._textures is None:
             return NO_TEXTURES
         baked, coordinates = self._textures
-        textures, geometry = replace_textures(baked, images, load_texture), self._tracer.geometry
+        textures, geometry = replace_textures(baked, images), self._tracer.geometry
         has_texture = (textures.material_textures[:, : len(TEXTURES)] >= 0).any(axis=1)
         mesh_args = geometry.positions, geometry.faces, geometry.face_normals, has_texture[geometry.face_material]
         return hit_textures(textures, project_missing(coordinates, *mesh_args))
@@ -180,8 +179,10 @@ class LobeTracer:
         if alpha_test is None or not np.any(alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE):
             return np.empty((0, 4), np.float32)
         row, rules = alpha_test.alpha_masks.material_rule, alpha_test.alpha_masks.rules
-        is_glass = np.asarray((row >= 0) & (rules[row, 0] == GLASS_RULE))
-        return np.where(is_glass[:, None], rules[row, 1:5], np.float32(-1))
+        materials = np.flatnonzero((row >= 0) & (rules[row, 0] == GLASS_RULE))
+        glass = np.full((len(row), 4), -1, np.float32)
+        glass[materials] = rules[row[materials], 1:5]
+        return glass
 
     @cached_property
     def _normals(self) -> F32:
