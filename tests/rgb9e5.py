@@ -1,4 +1,4 @@
-"""Shared-exponent pixels in plain NumPy: the reference of `relume.views.resolve`."""
+"""Shared-exponent pixels in plain NumPy: the reference of `relume.math.rgb9e5`."""
 
 from __future__ import annotations
 

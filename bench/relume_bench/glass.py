@@ -11,9 +11,7 @@ them.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +30,7 @@ from relume.store.bake_protocol import Recipe
 from relume_bench.figure import Figure, skipped
 from relume_bench.gather import bake
 from relume_bench.indirect import PASSES
-from relume_bench.mitsuba import averaged, bsdf, missing, read_passes, render
+from relume_bench.mitsuba import averaged, bsdf, dielectric, missing, read_passes, render
 from relume_bench.standard_error import NoiseCorrectedError, compare_with_passes
 
 F32 = NDArray[np.float32]
@@ -143,20 +141,7 @@ def _render_relume(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path
 
 def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path) -> F32:
     materials = [scene.materials[mesh.material] for mesh in scene.meshes]
-    bsdfs = [bsdf(m.terms) if m.glass is None else _dielectric(m.glass) for m in materials]
+    bsdfs = [bsdf(m.terms) if m.glass is None else dielectric(m.glass) for m in materials]
     job = {"integrator": {"type": "volpath", "max_depth": _DEPTH}, "spp": [spp], "passes": PASSES, "bsdfs": bsdfs}
     render(scene, size, job, folder)
     return read_passes(folder)
-
-
-def _dielectric(glass: Glass) -> Mapping[str, Any]:
-    """Glass as a Mitsuba plugin, with the medium inside a solid."""
-    if glass.thickness == 0:
-        tint = {"type": "rgb", "value": list(glass.tint)}
-        return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}
-    max_absorption = max(*glass.absorbed, 1e-9)
-    rate = {"type": "rgb", "value": [absorbed / max_absorption for absorbed in glass.absorbed]}
-    rough = {} if glass.roughness == 0 else {"alpha": glass.roughness**2, "distribution": "ggx"}
-    kind = "roughdielectric" if rough else "dielectric"
-    inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
-    return {"type": kind, "int_ior": glass.ior, "interior": inside, **rough}

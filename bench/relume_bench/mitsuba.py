@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term_validation import complete_term
 from relume.core.digest import digest
-from relume.scene.model import Scene
+from relume.scene.model import Glass, Scene
 
 F32 = NDArray[np.float32]
 
@@ -76,6 +76,19 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent,
         "diffuse_share": diffuse_fraction,
     }  # fmt: skip
+
+
+def dielectric(glass: Glass) -> dict[str, Any]:
+    """Glass as a Mitsuba plugin, with the medium inside a solid."""
+    if glass.thickness == 0:
+        tint = {"type": "rgb", "value": list(glass.tint)}
+        return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}
+    max_absorption = max(*glass.absorbed, 1e-9)
+    rate = {"type": "rgb", "value": [absorbed / max_absorption for absorbed in glass.absorbed]}
+    rough = {} if glass.roughness == 0 else {"alpha": glass.roughness**2, "distribution": "ggx"}
+    inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
+    kind = "roughdielectric" if rough else "dielectric"
+    return {"type": kind, "int_ior": glass.ior, "interior": inside, **rough}
 
 
 def map_for_mitsuba(radiance: F32) -> F32:

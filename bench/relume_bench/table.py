@@ -63,6 +63,7 @@ TARGETS = {
     "sharp.rmse_0.3": "≤ 3 %",
     "sharp.rmse_plastic_0.05": "≤ 3 %",
     "sharp.rmse_plastic_0.1": "≤ 3 %",
+    "sharp.rmse_checker": "≤ 3 %",
     "sharp.rmse_room": "≤ 5 %",
     "sharp.speckle_0.02": "≤ 1.3",
     "sharp.speckle_0.05": "≤ 1.3",

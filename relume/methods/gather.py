@@ -4,6 +4,7 @@ Besides the arrays of `relume.methods.view_stages`: surface patches, the lights 
 patches and view samples. Only the patch that each ray hits is stored; directions are generated again from a seed.
 Stages after those of the views: "patches", then "gather rays" (rows of patches, rows of each view).
 
+    scene/uvs, textures/<k>                     relume.raytrace.surface_textures
     patches/axis, value, children, roots        relume.patches.patch_kdtree.PatchTree
     patches/position, normal, material, …       relume.patches.patches.Patches
     patches/visibility                          lights visible from the sample points of patches, patch by patch
@@ -17,6 +18,7 @@ Stages after those of the views: "patches", then "gather rays" (rows of patches,
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +36,7 @@ from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import MAX_PATCHES
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches
 from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.surface_textures import texture_arrays, texture_attributes
 from relume.raytrace.visibility_masks import trace_visibility_masks
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
@@ -96,8 +99,11 @@ class GatherMethod:
             store_bytes=direct.store_bytes
             + direct.num_view_samples * (2 * rays + 4 + -(-num_mirror_lights // 8))
             + patch_count * _PATCH_BYTES
-            + num_points * bits,
+            + num_points * bits
+            + plan_estimates.texture_bytes(scene)
+            + plan_estimates.corner_bytes(scene),
             peak_bytes=direct.peak_bytes
+            + plan_estimates.texture_bytes(scene)
             + patch_count * _PATCH_BUILD_BYTES
             + plan_estimates.num_triangles(scene) * _NORMAL_BYTES
             + SHARD_ROWS * (3 * 2 * rays + _SHARD_ROW_BYTES + 2 * num_mirror_lights),
@@ -110,6 +116,7 @@ class GatherMethod:
         diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
         return {
             **self._views.attributes(scene, recipe),
+            **texture_attributes(scene),
             "gather_rays": [
                 diffuse if all(map(scatters_diffusely, material.terms)) else glossy for material in scene.materials
             ],
@@ -158,7 +165,9 @@ class GatherMethod:
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
         """Compute a task; seeded by scene and rows: deterministic on any machine. See `BakeMethod`."""
         if task.stage < _PATCH_STAGE:
-            return self._views.compute(scene, recipe, task, store)
+            output = self._views.compute(scene, recipe, task, store)
+            is_of_scene = task.stage == 0 and not task.group
+            return replace(output, arrays={**output.arrays, **self._texture_arrays(scene)}) if is_of_scene else output
         if task.stage == _PATCH_STAGE:
             return self._bake_patches(scene, recipe, store)
         return (
@@ -166,6 +175,10 @@ class GatherMethod:
             if task.group
             else self._bake_patch_rows(scene, task, store)
         )
+
+    def _texture_arrays(self, scene: Scene) -> dict[str, NDArray[Any]]:
+        """Textures of the scene and their coordinates, for lobe rays that hit its surfaces."""
+        return {"scene/uvs": self._views.geometry_of(scene).uvs, **texture_arrays(scene)}
 
     def _ray_counts(self, recipe: Recipe) -> tuple[int, int]:
         """Rays per view sample, and the number of glossy ones for highlights, in a fixed ratio."""

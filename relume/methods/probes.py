@@ -40,11 +40,12 @@ from relume.patches.patches import POINTS_PER_PATCH, choose_patches
 from relume.probes.density import density_from_distance, density_from_shadows
 from relume.probes.interpolation_weights import PROBES_PER_NODE
 from relume.probes.mesh_lattice import MAX_PROBES, make_corner_grid, max_grid_nodes, place_probes
-from relume.probes.stored_scene import collect_textures, corner_tangents, ray_pattern, read_probes
+from relume.probes.stored_scene import corner_tangents, ray_pattern, read_probes
 from relume.probes.visible_sides import visible_sides
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.surface_textures import texture_arrays, texture_attributes
 from relume.raytrace.visibility import VisibilityBits, trace_visibility
 from relume.raytrace.visibility_masks import LightTargets, trace_visibility_masks
 from relume.scene.model import Scene
@@ -118,7 +119,7 @@ class ProbesMethod:
             "gather_seed": int(scene.id[:7], 16),
             "has_sh": True,
             "has_free_camera_error": True,
-            **collect_textures(scene).attributes,
+            **texture_attributes(scene),
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
@@ -180,7 +181,7 @@ class ProbesMethod:
             **light_arrays(scene, recipe),
             **triangle_arrays(geometry, scene),
             "scene/tangents": corner_tangents(scene, geometry),
-            **collect_textures(scene).arrays,
+            **texture_arrays(scene),
         }
 
     def _bake_probes(self, scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:

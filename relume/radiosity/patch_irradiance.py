@@ -31,6 +31,9 @@ from relume.transport.shading_points import GatherRays
 
 F32 = NDArray[np.float32]
 
+MIN_TEXTURE = np.float32(2**-10)
+"""Least mean of a texture on a patch, whose light is divided by it: a third of the first step above black in 8 bits."""
+
 _RAY_STRIDE = 16  # during an active edit one ray in 16 is used, except for the first bounce
 _ROOT_PI = np.float32(np.sqrt(np.pi))
 
@@ -99,16 +102,14 @@ class PatchLight:
         return highlights.subset(np.isin(highlights.rows, reflectance_operator.rows))
 
     def texture_multipliers(self, reflectances: Reflectances) -> F32:
-        """Return texture multipliers, with the look's material map overrides. (2, C, 3) float32"""
+        """Return texture multipliers, at least `MIN_TEXTURE`, with the look's map overrides. (2, C, 3) float32"""
         image_names = [material_reflectance.images for material_reflectance in reflectances]
-        if not any(map(any, image_names)):
-            return self.textures
-        multipliers = self.textures.copy()
+        multipliers = np.maximum(self.textures, MIN_TEXTURE)
         for material, images in enumerate(image_names):
             rows = np.flatnonzero(self.material == material)
             for channel, name in enumerate(images):
                 if name is not None:
-                    multipliers[channel, rows] = self._mean_texture(load_texture(name), rows)
+                    multipliers[channel, rows] = np.maximum(self._mean_texture(load_texture(name), rows), MIN_TEXTURE)
         return multipliers
 
     def _mean_texture(self, texture: Texture, rows: NDArray[np.intp]) -> F32:

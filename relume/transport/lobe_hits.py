@@ -16,6 +16,7 @@ from relume.core.thread_pools import parallel_for_cancellable
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import (
     LobePattern,
+    angle_at_quantile,
     lobe_ray,
     lobe_shift,
     ray_jitter,
@@ -33,14 +34,16 @@ from relume.raytrace.ray_packet import (
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.gather_kernel import in_frame
-from relume.transport.lobe_paths import MAX_REFLECTIONS, LobePaths, LobeSurfaces, follow, no_paths
-from relume.transport.patch_lookup import PatchLookup, allocate_lanes, locate_smoothly
+from relume.transport.lobe_paths import LobePaths, LobeSurfaces, follow, is_glass, look_up_hits, no_paths
+from relume.transport.patch_lookup import PatchLookup, allocate_lanes
 
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 256
-_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1), np.float32(2)
-_PIXEL_SEED = np.uint32(0x5BD1E995)
+_ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
+_ROOT_TWO_PI = np.float32(math.sqrt(2 * math.pi))
+_PIXEL_SEED, _ALPHA_SEED = np.uint32(0x5BD1E995), np.uint32(0x1B873593)
+_LEAST_ALPHA = np.float32(2**-24)
 _MIN_COSINE = np.float32(1e-3)
 
 
@@ -51,21 +54,24 @@ class LobeHits:
     Attributes:
         patch: index of the patch that each ray hits, `NO_PATCH` for none.
         escapes: ray k of a point in bit k & 7 of byte k >> 3, set if it leaves the scene.
-        paths: the rays that go on from narrow lobes.
+        texture: that each ray meets, packed, for each slot of `relume.transport.hit_textures.HitTextures`.
+        paths: the rays that go on from narrow lobes or through glass; for the latter `patch` is `NO_PATCH`.
     """
 
     patch: Shaped[NDArray[np.uint16], "n rays"]
     escapes: Shaped[NDArray[np.uint8], "n bytes"]
+    texture: Shaped[NDArray[np.uint32], "slots n rays"]
     paths: LobePaths
 
     @property
     def num_bytes(self) -> int:
         """Memory in use."""
-        return self.patch.nbytes + self.escapes.nbytes + sum(array.nbytes for array in self.paths)
+        stored = self.patch, self.escapes, self.texture, *self.paths
+        return sum(array.nbytes for array in stored)
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobeHits:
         """Select points."""
-        return LobeHits(self.patch[rows], self.escapes[rows], self.paths.rows(rows))
+        return LobeHits(self.patch[rows], self.escapes[rows], self.texture[:, rows], self.paths.rows(rows))
 
 
 NO_FOOTPRINT = np.zeros((1, 2, 2, 3), np.float32)
@@ -125,9 +131,37 @@ def _load_points(points, first, width, packet):  # type: ignore[no-untyped-def]
         enable_stochastic_alpha(packet, k, points.alpha_sample[min(p, points.alpha_sample.shape[0] - 1)])
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def half_vector_spread(footprint, p):  # type: ignore[no-untyped-def]
+    """Angle by which half vectors change at most between the middle and a corner of a point's footprint, radians."""
+    sides, total = footprint[min(p, footprint.shape[0] - 1)], _ZERO
+    for axis in range(2):
+        n, o = sides[0, axis], sides[1, axis]
+        total += _HALF * np.float32(math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]))
+        total += np.float32(0.25) * np.float32(math.sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]))
+    return total
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _ray_spacing(pattern, level, spread):  # type: ignore[no-untyped-def]
+    """Angle between neighboring rays of a point, radians: their footprint at unit distance.
+
+    Half of the rays are within the median of the lobe; all are spread over the pixel.
+
+    Args:
+        pattern, level: of the point. spread: from `half_vector_spread`.
+    """
+    median = angle_at_quantile(pattern.quantile, level, _HALF)
+    radius = _TWO * median if pattern.is_half_angle else median
+    return (_ROOT_TWO_PI * radius + _TWO * spread) / np.float32(math.sqrt(pattern.uv.shape[0]))
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, packet):  # type: ignore[no-untyped-def]
-    """Aim the same ray of all lanes; return the number of rays above their horizon. See `_trace`."""
+def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet):  # type: ignore[no-untyped-def]
+    """Aim the same ray of all lanes; return the number of rays above their horizon. See `_trace`.
+
+    Rays stop at all glass of a scene, and are not split by tints: their paths have three channels.
+    """
     num_valid = 0
     for k in range(LANES):
         p = first + min(k, width - 1)
@@ -136,48 +170,76 @@ def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, pack
             footprint[min(p, footprint.shape[0] - 1)], points.seed[p],
         )  # fmt: skip
         set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
+        if has_glass:
+            enable_stochastic_alpha(packet, k, max(ray_jitter(ray, points.seed[p] ^ _ALPHA_SEED)[0], _LEAST_ALPHA))
         is_traced = is_above and k < width and pattern.is_narrow[levels[k]]
         enable_lane(packet, k, is_traced)
         num_valid += is_traced
     return num_valid
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, hits, paths, end):  # type: ignore[no-untyped-def]
+    """Trace all rays of points [first, first + width), the same ray of all at once.
+
+    Args:
+        packet, lanes: memory. aim: shift and level of each lane.
+        points, wo, footprint, lookup, surfaces, pattern, hits, paths: as in `_trace`. end: number of paths so far.
+    Returns:
+        New number of paths.
+    """
+    (patch, escapes, texture), (shifts, levels) = hits, aim
+    has_glass, num_rays = surfaces.glass.shape[0] > 0, patch.shape[1]
+    follows = surfaces.quantile.shape[0] > 0 or has_glass
+    _load_points(points, first, width, packet)
+    for ray in range(num_rays):
+        if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
+            continue
+        trace_hits(packet)
+        for k in range(LANES):
+            lanes.distance[k] = 0
+        look_up_hits(packet, ray, lookup, surfaces, lanes)
+        for k in range(width):
+            face = get_hit(packet, k)[0]
+            is_escaping = packet.is_active[k] != 0 and face < 0
+            escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
+            for row in range(texture.shape[0]):
+                texture[row, first + k, ray] = lanes.texture[row, k]
+            passes_glass = packet.is_active[k] != 0 and face >= 0 and is_glass(surfaces, face)
+            patch[first + k, ray] = NO_PATCH if passes_glass else lanes.patches[k]
+        if follows:
+            before = end
+            end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
+            if end > before:
+                _load_points(points, first, width, packet)
+    return end
+
+
 @nb.njit(nogil=True, cache=True)
-def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, start, stop, patch, escapes, paths):  # type: ignore[no-untyped-def]
+def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, start, stop, hits, paths):  # type: ignore[no-untyped-def]
     """Trace all rays of points [start, stop), the same ray of `LANES` points at once.
 
     Args:
         tracer: of closest hits. points: `SurfacePoints`. wo: view directions. footprint: as in `trace_lobe_rays`, or
             one. level: roughness levels, or one.
         lookup, surfaces: `PatchLookup`, `LobeSurfaces`. pattern: `LobePattern`.
-        patch, escapes: of `LobeHits`, written; escapes are zero before. paths: see `_follow`.
+        hits: patch, escapes and texture of `LobeHits`, written; escapes are zero before. paths: see `follow`.
     Returns:
         Number of paths.
     """
     packet, lanes, end = new_packet(tracer), allocate_lanes(), 0
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
-    follows, num_rays = surfaces.quantile.shape[0] > 0, patch.shape[1]
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for k in range(LANES):
             p = first + min(k, width - 1)
             levels[k], lanes.seeds[k] = level[min(p, level.shape[0] - 1)], points.seed[p]
             shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
-        _load_points(points, first, width, packet)
-        for ray in range(num_rays):
-            if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, packet) == 0:
-                continue
-            trace_hits(packet)
-            locate_smoothly(packet, ray, lookup, lanes)
-            for k in range(width):
-                patch[first + k, ray] = lanes.patches[k]
-                is_escaping = packet.is_active[k] != 0 and get_hit(packet, k)[0] < 0
-                escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
-            if follows:
-                before = end
-                end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
-                if end > before:
-                    _load_points(points, first, width, packet)
+            lanes.spread[k] = _ray_spacing(pattern, levels[k], half_vector_spread(footprint, p))
+        end = _trace_packet(
+            packet, lanes, (shifts, levels), points, wo, footprint, lookup, surfaces, pattern, first, width, hits,
+            paths, end,
+        )  # fmt: skip
     return end
 
 
@@ -195,7 +257,7 @@ def trace_lobe_rays(
     """Trace the lobe rays of points. O(n · rays · (log triangles + log patches)) time.
 
     Args:
-        geometry: the scene's triangles. lookup: finds patches. surfaces: from which rays go on.
+        geometry: the scene's triangles. lookup: finds patches. surfaces: that rays meet.
         points: ray origins; their seeds shift the pattern. wo: view directions, unit, world space.
         footprint: change of each point's normal and of its wo along the two sides of its part of a pixel, over which
             rays are spread; or `NO_FOOTPRINT`.
@@ -204,23 +266,24 @@ def trace_lobe_rays(
     Raises:
         CancelledError: `is_canceled` returned true.
     """
-    num_points, num_rays = points.num_points, pattern.num_rays
+    num_points, num_rays, num_slots = points.num_points, pattern.num_rays, len(surfaces.textures.slots)
     patch = np.full((num_points, num_rays), NO_PATCH, np.uint16)
     escapes = np.zeros((num_points, -(-num_rays // 8)), np.uint8)
+    texture = np.zeros((num_slots, num_points, num_rays), np.uint32)
     levels = np.zeros(1, np.uint8) if level is None else level
     args = geometry.embree.hit_tracer(coherent=False), points, wo, footprint, levels, lookup, surfaces, pattern
     found: dict[int, LobePaths] = {}
 
     def kernel(start: int, stop: int) -> None:
-        capacity = (stop - start) * num_rays * (1 + MAX_REFLECTIONS) if len(surfaces.quantile) else 0
-        paths = LobePaths.allocate(capacity - 1, capacity)
-        num_paths = _trace(*args, start, stop, patch, escapes, paths)
+        capacity = (stop - start) * num_rays * surfaces.max_entries
+        paths = LobePaths.allocate(capacity - 1, capacity, num_slots)
+        num_paths = _trace(*args, start, stop, (patch, escapes, texture), paths)
         order = np.argsort(paths.first[:num_paths], kind="stable")
         found[start] = LobePaths._make(array[:num_paths][order] for array in paths)
 
     parallel_for_cancellable(kernel, num_points, _POINTS_PER_RANGE, lambda _: None, is_canceled, "tracing lobes")
     if not found:
-        return LobeHits(patch, escapes, no_paths(num_points))
+        return LobeHits(patch, escapes, texture, no_paths(num_points, num_slots))
     point, *columns = (np.concatenate(arrays) for arrays in zip(*(found[k] for k in sorted(found)), strict=True))
     first = np.searchsorted(point, np.arange(num_points + 1)).astype(np.int64)
-    return LobeHits(patch, escapes, LobePaths(first, *columns))
+    return LobeHits(patch, escapes, texture, LobePaths(first, *columns))

@@ -1,7 +1,8 @@
-"""Paths of lobe rays that go on from surfaces with narrow lobes.
+"""Paths of lobe rays that go on from surfaces with narrow lobes, and through glass.
 
-A ray that meets such a surface follows one direction of its lobe, up to four times: what chrome shows is not the
-light of a patch. The lobe's energy is its directional albedo, its shape is sampled.
+A ray that meets a narrow lobe follows one direction of it, up to four times: what chrome shows is not the light of a
+patch. The lobe's energy is its directional albedo, its shape is sampled. Glass adds what it reflects itself, and passes
+the ray with the transmittance of each channel.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
+from relume.math.rgb9e5 import unpack_rgb9e5
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import angle_at_quantile, lobe_direction, ray_jitter
 from relume.raytrace.ray_packet import (
@@ -28,26 +30,34 @@ from relume.raytrace.ray_packet import (
     set_origin,
     trace_hits,
 )
+from relume.transport.hit_textures import NO_TEXTURES, HitTextures, emission_image, look_up_textures
 from relume.transport.patch_lookup import locate_smoothly, tangents_of
 
 F32 = NDArray[np.float32]
 
 MAX_REFLECTIONS = 4
-END, ESCAPE, REFLECTION = np.uint8(0), np.uint8(1), np.uint8(2)
+_MAX_SIDES = 8  # of glass
+NO_EMITTER = np.uint16(65535)
+END, ESCAPE, REFLECTION, TRANSMISSION = np.uint8(0), np.uint8(1), np.uint8(2), np.uint8(3)
 """Kinds of entries in `LobePaths`."""
 
 _HALF, _ONE = np.float32(0.5), np.float32(1)
 
 
 class LobePaths(NamedTuple):
-    """Lobe rays that went on from surfaces with narrow lobes: where they reflect and end, point by point, ray by ray.
+    """Lobe rays that went on from narrow lobes or through glass, point by point, ray by ray.
 
     Attributes:
         first: begin of each point's entries. ray: index of the ray.
-        kind: `END`, `ESCAPE` or `REFLECTION`. The last is stored for wide lobes, which the peaks of the environment
-            light directly.
+        kind: `END` at a patch, also for the light that glass on the path reflects itself; `ESCAPE` from the scene,
+            `TRANSMISSION` if through glass alone; or `REFLECTION`, stored for wide lobes, which the peaks of the
+            environment light directly.
         patch: patch of the end or reflection, `NO_PATCH` for none. lobe: row in `LobeSurfaces` of the newest lobe.
-        throughput: product of the albedos so far. direction: of the newest ray; of a reflection its wo, world space.
+        texture: at the end, see `relume.transport.hit_textures`.
+        emitter: material of the end if it may emit light to this side after a reflection, else `NO_EMITTER`: the
+            samples of local lights are the light before any. emission: its image there, packed.
+        throughput: product of the albedos and transmittances so far.
+        direction: of the newest ray; of a reflection its wo, world space.
         normal: of a reflection.
     """
 
@@ -56,16 +66,28 @@ class LobePaths(NamedTuple):
     kind: Shaped[NDArray[np.uint8], " K"]
     patch: Shaped[NDArray[np.uint16], " K"]
     lobe: Shaped[NDArray[np.uint8], " K"]
+    texture: Shaped[NDArray[np.uint32], "K slots"]
+    emitter: Shaped[NDArray[np.uint16], " K"]
+    emission: Shaped[NDArray[np.uint32], " K"]
     throughput: Shaped[F32, "K 3"]
     direction: Shaped[F32, "K 3"]
     normal: Shaped[F32, "K 3"]
 
     @classmethod
-    def allocate(cls, num_points: int, num_entries: int) -> LobePaths:
-        """Allocate memory for entries."""
-        (ray, patch), (kind, lobe) = np.empty((2, num_entries), np.uint16), np.empty((2, num_entries), np.uint8)
+    def allocate(cls, num_points: int, num_entries: int, num_slots: int) -> LobePaths:
+        """Allocate memory for entries.
+
+        Args:
+            num_points: points of the paths. num_entries: entries. num_slots: textures of each.
+        """
+        (ray, patch, emitter), (kind, lobe) = (
+            np.empty((3, num_entries), np.uint16),
+            np.empty((2, num_entries), np.uint8),
+        )
         vectors = np.empty((3, num_entries, 3), np.float32)
-        return cls(np.zeros(num_points + 1, np.int64), ray, kind, patch, lobe, *vectors)
+        texture, emission = np.empty((num_entries, num_slots), np.uint32), np.empty(num_entries, np.uint32)
+        first = np.zeros(num_points + 1, np.int64)
+        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, *vectors)
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
         """Select the paths of some points."""
@@ -75,13 +97,13 @@ class LobePaths(NamedTuple):
         return LobePaths(first, *(array[index] for array in self[1:]))
 
 
-def no_paths(num_points: int) -> LobePaths:
-    """Return the paths of rays that meet no narrow lobe."""
-    return LobePaths.allocate(num_points, 0)
+def no_paths(num_points: int, num_slots: int = 0) -> LobePaths:
+    """Return the paths of rays that meet neither a narrow lobe nor glass."""
+    return LobePaths.allocate(num_points, 0, num_slots)
 
 
 class LobeSurfaces(NamedTuple):
-    """Surfaces from which lobe rays go on.
+    """Surfaces that lobe rays meet, and from which they go on.
 
     Attributes:
         faces: corners of the triangles. face_material: their materials.
@@ -90,7 +112,11 @@ class LobeSurfaces(NamedTuple):
         quantile, band_density, is_half_angle, scale: as in `LobePattern`, at one level.
         albedo: directional albedo at equal steps of cos θo from 0 to 1.
         blur: angle over which the environment is averaged behind a wide lobe, radians; zero for others.
-        tint: mean of the specular texture of each patch; ones in row `NO_PATCH`.
+        tint: mean of the specular texture of each patch, for a store without textures; ones in row `NO_PATCH`.
+        textures: of all surfaces. specular: row of the specular texture among those of a hit, −1 for none.
+        glass: transmittance of each material for red, green and blue without reflectance, −1 if it is opaque, and the
+            reflectance at normal incidence; no rows for a scene without glass.
+        is_two_sided: of each material, whether it emits to both sides.
         offset: of ray origins from surfaces, meters.
     """
 
@@ -105,7 +131,18 @@ class LobeSurfaces(NamedTuple):
     albedo: Shaped[F32, "S steps 3"]
     blur: Shaped[F32, " S"]
     tint: Shaped[F32, "patches 3"]
+    textures: HitTextures
+    specular: int
+    glass: Shaped[F32, "materials 4"]
+    is_two_sided: Shaped[NDArray[np.bool_], " materials"]
     offset: float
+
+    @property
+    def max_entries(self) -> int:
+        """Largest number of entries of a ray in `LobePaths`."""
+        num_reflections = MAX_REFLECTIONS if len(self.quantile) else 0
+        num_sides = _MAX_SIDES if len(self.glass) else 0
+        return num_reflections + num_sides + 1 if num_reflections + num_sides else 0
 
 
 NO_SURFACES = LobeSurfaces(
@@ -120,6 +157,10 @@ NO_SURFACES = LobeSurfaces(
     albedo=np.empty((0, 0, 3), np.float32),
     blur=np.empty(0, np.float32),
     tint=np.empty((0, 3), np.float32),
+    textures=NO_TEXTURES,
+    specular=-1,
+    glass=np.empty((0, 4), np.float32),
+    is_two_sided=np.empty(0, np.bool_),
     offset=0.0,
 )
 """Of a scene in which all rays end at the first surface."""
@@ -178,60 +219,146 @@ def _reflect(packet, k, lobe, random, face_normal, surfaces, throughput, normal)
     return is_valid and z > 0 and facing > 0
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _transmit(packet, k, material, face_normal, surfaces, throughput):  # type: ignore[no-untyped-def]
+    """Let a lane pass the glass that it hits, unrefracted as shadow rays.
+
+    Args:
+        packet: the ray's origin is replaced. k: the lane. material: of the glass. face_normal: of all faces.
+        surfaces: `LobeSurfaces`. throughput: multiplied by the transmittance. (3, `LANES`)
+    """
+    face, _ = get_hit(packet, k)
+    nx, ny, nz = face_normal[face, 0], face_normal[face, 1], face_normal[face, 2]
+    dx, dy, dz = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)
+    facing, f0 = nx * dx + ny * dy + nz * dz, surfaces.glass[material, 3]
+    passing = _ONE - f0 - (_ONE - f0) * (_ONE - min(abs(facing), _ONE)) ** 5
+    for channel in range(3):
+        throughput[channel, k] *= passing * surfaces.glass[material, channel]
+    offset = np.float32(surfaces.offset) if facing > 0 else -np.float32(surfaces.offset)
+    px, py, pz = get_position(packet, k, 0), get_position(packet, k, 1), get_position(packet, k, 2)
+    set_origin(packet, k, px + offset * nx, py + offset * ny, pz + offset * nz)
+    set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
+
+
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _store(paths, entry, point, ray, kind, patch, lanes, k, direction):  # type: ignore[no-untyped-def]
-    """Write an entry of paths, with the point in `first`; its throughput, lobe and normal are those of lane k."""
+    """Write an entry of paths, with the point in `first`; the rest is that of lane k."""
     paths.first[entry], paths.ray[entry], paths.kind[entry], paths.patch[entry] = point, ray, kind, patch
     paths.lobe[entry] = lanes.lobe[k]
+    is_lit = kind == END and lanes.lobe[k] >= 0
+    paths.emitter[entry], paths.emission[entry] = lanes.emitter[k] if is_lit else NO_EMITTER, lanes.emission[k]
+    for row in range(paths.texture.shape[1]):
+        paths.texture[entry, row] = lanes.texture[row, k]
     for axis in range(3):
         paths.throughput[entry, axis], paths.normal[entry, axis] = lanes.throughput[axis, k], lanes.normal[axis, k]
         paths.direction[entry, axis] = direction[axis]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def look_up_hits(packet, ray, lookup, surfaces, lanes):  # type: ignore[no-untyped-def]
+    """Find the patches and textures that the rays of all lanes hit.
+
+    Args:
+        packet: traced rays. ray: their index. lookup, surfaces: `PatchLookup`, `LobeSurfaces`.
+        lanes: `RayLanes`; its distances grow by those of the rays.
+    """
+    locate_smoothly(packet, ray, lookup, lanes)
+    if surfaces.textures.slots.shape[0] == 0:
+        return
+    for k in range(LANES):
+        face, distance = get_hit(packet, k)
+        if packet.is_active[k] != 0 and face >= 0:
+            lanes.distance[k] += distance
+    look_up_textures(packet, surfaces.textures, surfaces.face_material, lanes)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _look_up_emission(packet, k, face_normal, surfaces, lanes):  # type: ignore[no-untyped-def]
+    """Find the material that may emit light at a lane's hit, and its image. See `LobePaths`."""
+    face, _ = get_hit(packet, k)
+    lanes.emitter[k] = NO_EMITTER
+    if face < 0:
+        return
+    material = surfaces.face_material[face]
+    facing = np.float32(0)
+    for axis in range(3):
+        facing += face_normal[face, axis] * get_direction(packet, k, axis)
+    if facing < 0 or surfaces.is_two_sided[material]:
+        lanes.emitter[k] = material
+        lanes.emission[k] = emission_image(packet, k, face, material, surfaces.textures, lanes)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _tint(surfaces, lanes, k):  # type: ignore[no-untyped-def]
+    """Specular texture at a lane's hit, a tuple."""
+    if surfaces.specular >= 0:
+        return unpack_rgb9e5(lanes.texture[surfaces.specular, k])
+    tint = surfaces.tint[lanes.last[k]]
+    return tint[0], tint[1], tint[2]
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def is_glass(surfaces, face):  # type: ignore[no-untyped-def]
+    """True if a triangle is of glass."""
+    return surfaces.glass.shape[0] > 0 and surfaces.glass[surfaces.face_material[face], 0] >= 0
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end):  # type: ignore[no-untyped-def]
-    """Follow the rays of all lanes that hit a narrow lobe, and store their ends.
+    """Follow the rays of all lanes that hit a narrow lobe or glass, and store their ends.
 
     Args:
         packet: traced rays. ray: their index. num_rays: rays of a point. first, width: points of the lanes.
-        lookup, surfaces: `PatchLookup`, `LobeSurfaces`. lanes: `RayLanes`, with the patches of the traced rays.
+        lookup, surfaces: `PatchLookup`, `LobeSurfaces`. lanes: `RayLanes`, with the hits of the traced rays.
         paths: `LobePaths`, written, with the point of each path in `first`. end: number of paths so far.
     Returns:
         New number of paths.
     """
-    seeds, _, _, patches, last, lobes, throughput, normal, has_escaped = lanes
+    last, lobes, throughput, has_escaped = lanes.last, lanes.lobe, lanes.throughput, lanes.has_escaped
     for k in range(LANES):
-        lobes[k], has_escaped[k], last[k] = -1, False, patches[k]
+        lobes[k], has_escaped[k], last[k] = -1, False, lanes.patches[k]
+        lanes.num_reflections[k], lanes.is_path[k] = 0, False
         throughput[0, k] = throughput[1, k] = throughput[2, k] = _ONE
-    for depth in range(1, MAX_REFLECTIONS + 1):
+    for _ in range(MAX_REFLECTIONS + _MAX_SIDES):
         num_active = 0
         for k in range(LANES):
             face = get_hit(packet, k)[0] if packet.is_active[k] != 0 else np.int32(-1)
             lobe = surfaces.lobe[surfaces.face_material[face]] if face >= 0 else np.int32(-1)
-            is_reflected = False
-            if lobe >= 0:
+            goes_on, patch = False, last[k]
+            view = -get_direction(packet, k, 0), -get_direction(packet, k, 1), -get_direction(packet, k, 2)
+            if face >= 0 and is_glass(surfaces, face):
+                if patch != NO_PATCH and k < width:
+                    _store(paths, end, first + k, ray, END, patch, lanes, k, (-view[0], -view[1], -view[2]))
+                    end += 1
+                _transmit(packet, k, surfaces.face_material[face], lookup.normals, surfaces, throughput)
+                goes_on, lanes.is_path[k], last[k] = True, True, NO_PATCH
+            elif lobe >= 0 and lanes.num_reflections[k] < MAX_REFLECTIONS:
+                tint = _tint(surfaces, lanes, k)
                 for channel in range(3):
-                    throughput[channel, k] *= surfaces.tint[last[k], channel]
-                random, patch = ray_jitter(ray + depth * num_rays, seeds[k]), last[k]
-                view = -get_direction(packet, k, 0), -get_direction(packet, k, 1), -get_direction(packet, k, 2)
-                is_reflected = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput, normal)
-                lobes[k], last[k] = lobe, NO_PATCH
+                    throughput[channel, k] *= tint[channel]
+                lanes.num_reflections[k] += 1
+                random = ray_jitter(ray + lanes.num_reflections[k] * num_rays, lanes.seeds[k])
+                goes_on = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput, lanes.normal)
+                lobes[k], last[k], lanes.is_path[k], lanes.emitter[k] = lobe, NO_PATCH, True, NO_EMITTER
                 if surfaces.blur[lobe] > 0 and k < width:
                     _store(paths, end, first + k, ray, REFLECTION, patch, lanes, k, view)
                     end += 1
-            enable_lane(packet, k, is_reflected)
-            num_active += is_reflected
+            enable_lane(packet, k, goes_on)
+            num_active += goes_on
         if num_active == 0:
             break
         trace_hits(packet)
-        locate_smoothly(packet, ray, lookup, lanes)
+        look_up_hits(packet, ray, lookup, surfaces, lanes)
         for k in range(LANES):
             if packet.is_active[k] != 0:
-                last[k], has_escaped[k] = patches[k], get_hit(packet, k)[0] < 0
+                last[k], has_escaped[k] = lanes.patches[k], get_hit(packet, k)[0] < 0
+                _look_up_emission(packet, k, lookup.normals, surfaces, lanes)
     for k in range(width):
-        if lobes[k] >= 0:
+        if lanes.is_path[k]:
             direction = get_direction(packet, k, 0), get_direction(packet, k, 1), get_direction(packet, k, 2)
-            kind = ESCAPE if has_escaped[k] and last[k] == NO_PATCH else END
+            kind = END
+            if has_escaped[k] and last[k] == NO_PATCH:
+                kind = ESCAPE if lobes[k] >= 0 else TRANSMISSION
             _store(paths, end, first + k, ray, kind, last[k], lanes, k, direction)
             end += 1
     return end

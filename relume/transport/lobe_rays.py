@@ -25,12 +25,14 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.fast_math import acos_clamped, azimuth_fraction
+from relume.math.rgb9e5 import unpack_rgb9e5
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
 from relume.transport.gather_kernel import in_frame
+from relume.transport.hit_textures import TexturedLight
 from relume.transport.light_culling import ListedLights, half_angle_reach
-from relume.transport.lobe_hits import LobeHits, lobe_ray_in_pixel
-from relume.transport.lobe_paths import ESCAPE, REFLECTION, LobeSurfaces
+from relume.transport.lobe_hits import LobeHits, half_vector_spread, lobe_ray_in_pixel
+from relume.transport.lobe_paths import ESCAPE, REFLECTION, TRANSMISSION, LobeSurfaces
 from relume.transport.outgoing_patch_light import OutgoingLight, bin_of
 from relume.transport.shading_points import ListedRays, ShadingPoints
 
@@ -91,6 +93,7 @@ class LobePeaks(NamedTuple):
     visible: Shaped[F32, "patches K"]
 
 
+NO_EMISSION = np.empty((0, 3), np.float32)
 NO_PEAKS = LobePeaks(np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), np.empty((0, 0), np.float32))
 
 
@@ -100,20 +103,24 @@ class LobeRays:
 
     Attributes:
         hits: what each ray meets. pattern: ray directions, shifted by the points' seeds.
-        outgoing: outgoing radiance of the patches. environment: light of the rays that leave the scene.
+        outgoing: outgoing radiance of the patches. textured: its isotropic part, by the textures at a hit.
+        environment: light of the rays that leave the scene.
         broad_share: share of each patch's isotropic radiance that its narrow lobe does not reflect.
         footprint: of each point, see `trace_lobe_rays`.
         surfaces: that rays go on from. peaks: of the environment.
+        emission: radiance of each material's surfaces, which surfaces with narrow lobes reflect; empty for none.
     """
 
     hits: LobeHits
     pattern: LobePattern
     outgoing: OutgoingLight
+    textured: TexturedLight
     environment: LobeEnvironment
     broad_share: Shaped[F32, " patches"]
     footprint: Shaped[F32, "#n 2 2 3"]
     surfaces: LobeSurfaces
     peaks: LobePeaks
+    emission: Shaped[F32, "materials 3"]
 
     @property
     def max_rays_per_point(self) -> int:
@@ -128,8 +135,15 @@ class LobeRays:
     def list_into(self, listed: ListedRays, receivers: ShadingPoints, start: int, stop: int) -> int:
         """List the rays of `receivers` [start, stop) into `listed`; see `RayList`."""
         r, point_args = receivers, (self.footprint, _levels(receivers))
-        light_args = self.outgoing, self.broad_share, self.environment, self.surfaces, self.peaks
-        hits = self.hits.patch, self.hits.escapes, self.hits.paths
+        light_args = (
+            (self.outgoing, self.textured),
+            self.broad_share,
+            self.environment,
+            self.surfaces,
+            self.peaks,
+            self.emission,
+        )
+        hits = self.hits.patch, self.hits.escapes, self.hits.texture, self.hits.paths
         return int(_list_lobe_rays(r.points, r.wo, *point_args, hits, self.pattern, light_args, start, stop, listed))
 
     def share_triangles(
@@ -151,22 +165,11 @@ def _levels(receivers: ShadingPoints) -> NDArray[np.uint8]:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def spread_of(sides):  # type: ignore[no-untyped-def]
-    """Angle by which half vectors change at most between the middle and a corner of a footprint, radians."""
-    total = _ZERO
-    for axis in range(2):
-        n, o = sides[0, axis], sides[1, axis]
-        total += _HALF * np.float32(math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]))
-        total += np.float32(0.25) * np.float32(math.sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]))
-    return total
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _triangle_share(pattern, level, radius, solid_angle, spread, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Share t of a triangle at a point.
 
     Args:
-        pattern, level: of the point. radius, solid_angle: of the triangle. spread: from `spread_of`.
+        pattern, level: of the point. radius, solid_angle: of the triangle. spread: from `half_vector_spread`.
         ix, iy, iz: local direction of the triangle. ox, oy, oz: local wo.
     """
     if pattern.is_half_angle:
@@ -186,10 +189,7 @@ def _share_triangles(pattern, footprint, level, radius, solid_angle, start, num,
     """Multiply listed triangles by their share; see `LobeRays.share_triangles`."""
     wi, wo = listed.wi, listed.wo
     for row in range(num):
-        point_level, spread = (
-            level[min(start + row, level.shape[0] - 1)],
-            spread_of(footprint[min(start + row, footprint.shape[0] - 1)]),
-        )
+        point_level, spread = level[min(start + row, level.shape[0] - 1)], half_vector_spread(footprint, start + row)
         if not pattern.is_narrow[point_level]:
             continue
         for entry in range(listed.first[row], listed.first[row + 1]):
@@ -222,7 +222,7 @@ def _from_environment(environment, pattern, level, spread, frame, world, jitter,
     """Radiance of the environment along a ray, less the share of the triangle that it meets.
 
     Args:
-        spread: from `spread_of`. frame: tangent, bitangent and normal of the point.
+        spread: from `half_vector_spread`. frame: tangent, bitangent and normal of the point.
         world: world-space direction of the ray.
         jitter: see `_texel`. o: local wo.
     """
@@ -242,16 +242,39 @@ def _from_environment(environment, pattern, level, spread, frame, world, jitter,
     return rest * radiance[row, column, 0], rest * radiance[row, column, 1], rest * radiance[row, column, 2]
 
 
+@nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def texels_at(textured, texture):  # type: ignore[no-untyped-def]
+    """Diffuse and specular texture at a hit, two tuples. texture: packed, of its slots"""
+    diffuse = specular = _ONE, _ONE, _ONE
+    if textured.diffuse >= 0:
+        diffuse = unpack_rgb9e5(texture[textured.diffuse])
+    if textured.specular >= 0:
+        specular = unpack_rgb9e5(texture[textured.specular])
+    return diffuse, specular
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def from_patch(outgoing, patch, world):  # type: ignore[no-untyped-def]
-    """Radiance of a patch against a world-space direction."""
-    red, green, blue = outgoing.isotropic[patch, 0], outgoing.isotropic[patch, 1], outgoing.isotropic[patch, 2]
+def isotropic_at(textured, patch, texels):  # type: ignore[no-untyped-def]
+    """Isotropic radiance of a patch at a point of it. texels: from `texels_at`."""
+    (r, g, b), (s, t, u) = texels
+    plain, diffuse, specular = textured.plain[patch], textured.by_diffuse[patch], textured.by_specular[patch]
+    return (
+        plain[0] + diffuse[0] * r + specular[0] * s,
+        plain[1] + diffuse[1] * g + specular[1] * t,
+        plain[2] + diffuse[2] * b + specular[2] * u,
+    )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def from_patch(outgoing, textured, patch, texels, world):  # type: ignore[no-untyped-def]
+    """Radiance of a patch at a point of it, against a world-space direction. texels: from `texels_at`."""
+    red, green, blue = isotropic_at(textured, patch, texels)
     row = outgoing.lobe[patch] if outgoing.smooth.shape[0] > 0 else -1
     if row >= 0:
-        bin_index = bin_of(outgoing.frame, row, -world[0], -world[1], -world[2])
-        red += outgoing.scale[row, 0] * outgoing.smooth[row, bin_index, 0]
-        green += outgoing.scale[row, 1] * outgoing.smooth[row, bin_index, 1]
-        blue += outgoing.scale[row, 2] * outgoing.smooth[row, bin_index, 2]
+        bin_index, (s, t, u), unit = bin_of(outgoing.frame, row, -world[0], -world[1], -world[2]), texels[1], textured
+        red += s * unit.per_specular[patch, 0] * outgoing.scale[row, 0] * outgoing.smooth[row, bin_index, 0]
+        green += t * unit.per_specular[patch, 1] * outgoing.scale[row, 1] * outgoing.smooth[row, bin_index, 1]
+        blue += u * unit.per_specular[patch, 2] * outgoing.scale[row, 2] * outgoing.smooth[row, bin_index, 2]
     return red, green, blue
 
 
@@ -304,8 +327,14 @@ def _from_peaks(peaks, surfaces, lobe, patch, n, o):  # type: ignore[no-untyped-
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _along_path(paths, first, last, outgoing, environment, surfaces, peaks):  # type: ignore[no-untyped-def]
-    """Radiance that the entries [first, last) of a path bring to its ray."""
+def _along_path(paths, first, last, patches, environment, surfaces, peaks, emission, direct):  # type: ignore[no-untyped-def]
+    """Radiance that the entries [first, last) of a path bring to its ray.
+
+    Args:
+        patches: outgoing and textured light of `LobeRays`. emission: of `LobeRays`.
+        direct: radiance of the environment along the ray.
+    """
+    outgoing, textured = patches
     red = green = blue = _ZERO
     for entry in range(first, last):
         kind, patch, lobe, d = paths.kind[entry], paths.patch[entry], paths.lobe[entry], paths.direction[entry]
@@ -317,8 +346,18 @@ def _along_path(paths, first, last, outgoing, environment, surfaces, peaks):  # 
         elif kind == ESCAPE:
             if environment.radiance.shape[0] > 0:
                 light = _environment_behind(environment, surfaces.blur[lobe], direction)
+        elif kind == TRANSMISSION:
+            light = direct
         elif patch != NO_PATCH:
-            light = from_patch(outgoing, patch, direction)
+            light = from_patch(outgoing, textured, patch, texels_at(textured, paths.texture[entry]), direction)
+        emitter = paths.emitter[entry]
+        if emitter < emission.shape[0]:
+            image = unpack_rgb9e5(paths.emission[entry])
+            light = (
+                light[0] + emission[emitter, 0] * image[0],
+                light[1] + emission[emitter, 1] * image[1],
+                light[2] + emission[emitter, 2] * image[2],
+            )
         red += paths.throughput[entry, 0] * light[0]
         green += paths.throughput[entry, 1] * light[1]
         blue += paths.throughput[entry, 2] * light[2]
@@ -332,17 +371,18 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
     Args:
         points: `SurfacePoints`. wo: view directions. (n, 3) footprint: of `LobeRays`. level: roughness levels, or one.
         hits: the fields of `LobeHits`. pattern: of `LobeRays`.
-        light_args: its outgoing, broad_share, environment, surfaces and peaks.
+        light_args: its outgoing and textured, broad_share, environment, surfaces, peaks and emission.
         listed: `ListedRays`, written.
     Returns:
         K, the number of rays.
     """
-    (patch, escapes, paths), (outgoing, broad_share, environment, surfaces, peaks) = hits, light_args
+    (patch, escapes, texture, paths), (patches, broad_share, environment, surfaces, peaks, emission) = hits, light_args
+    outgoing, textured = patches
     wi, end, has_environment = listed.wi, 0, environment.radiance.shape[0] > 0
     is_direct = has_environment and environment.is_direct
     for p in range(start, stop):
         listed.first[p - start] = end
-        point_level, spread = level[min(p, level.shape[0] - 1)], spread_of(footprint[min(p, footprint.shape[0] - 1)])
+        point_level, spread = level[min(p, level.shape[0] - 1)], half_vector_spread(footprint, p)
         if not pattern.is_narrow[point_level]:
             continue
         n, t = points.normal[p], points.tangent[p]
@@ -362,19 +402,18 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
             world, _ = lobe_ray_in_pixel(
                 pattern, point_level, ray, shift, n, t, wo[p], footprint[min(p, footprint.shape[0] - 1)], points.seed[p]
             )
-            if is_escaping:
+            is_passing = is_path and paths.kind[path - 1] == TRANSMISSION
+            light = (_ZERO, _ZERO, _ZERO)
+            if is_escaping or (is_passing and is_direct):
                 jitter = ray_jitter(ray, points.seed[p])
                 light = _from_environment(environment, pattern, point_level, spread, (t, b, n), world, jitter, o)
-            elif is_path:
-                red, green, blue = _along_path(paths, first_entry, path, outgoing, environment, surfaces, peaks)
+            if is_path:
+                light = _along_path(paths, first_entry, path, patches, environment, surfaces, peaks, emission, light)
+                red, green, blue = isotropic_at(textured, hit, texels_at(textured, texture[:, p, ray]))
                 share = broad_share[hit]
-                light = (
-                    red + share * outgoing.isotropic[hit, 0],
-                    green + share * outgoing.isotropic[hit, 1],
-                    blue + share * outgoing.isotropic[hit, 2],
-                )
-            else:
-                light = from_patch(outgoing, hit, world)
+                light = light[0] + share * red, light[1] + share * green, light[2] + share * blue
+            elif not is_escaping:
+                light = from_patch(outgoing, textured, hit, texels_at(textured, texture[:, p, ray]), world)
             hx, hy, hz = x + o[0], y + o[1], z + o[2]
             cos_theta_d = _HALF * np.float32(math.sqrt(hx * hx + hy * hy + hz * hz))
             weight = z / max(lobe_density(pattern, point_level, band, cos_theta_d), np.float32(1e-20))

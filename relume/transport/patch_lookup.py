@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.texture_slots import TEXTURES
 from relume.core.numba_options import NO_REFCOUNT
 from relume.patches.gather_hits import find_sides
 from relume.patches.patch_kdtree import NO_PATCH, PatchTree, locate
@@ -18,6 +19,7 @@ from relume.raytrace.ray_packet import LANES
 F32 = NDArray[np.float32]
 
 _ONE, _TWO = np.float32(1), np.float32(2)
+_MAX_SLOTS = len(TEXTURES)
 _HALF_WIDTH = 1.25  # of a square, by the spread of uniform points in it
 
 
@@ -50,6 +52,10 @@ class RayLanes(NamedTuple):
         seeds: of the points. keys: position and normal of each hit, moved within about a patch. roots: of its side.
         patches: of the newest hits. last: patch of each path's end. lobe: its newest lobe, −1 before one is met.
         throughput: as in `LobePaths`. normal: of the newest reflection. has_escaped: whether the ray left the scene.
+        num_reflections: so far. is_path: whether the ray went on from its first hit.
+        spread: width of a ray's footprint by the length of its path. distance: this length, meters.
+        texture: of the newest hit, see `relume.transport.hit_textures`. texel: memory for a lookup.
+        emitter, emission: of the newest hit, as in `LobePaths`.
     """
 
     seeds: Shaped[NDArray[np.uint32], " lanes"]
@@ -61,6 +67,14 @@ class RayLanes(NamedTuple):
     throughput: Shaped[F32, "3 lanes"]
     normal: Shaped[F32, "3 lanes"]
     has_escaped: Shaped[NDArray[np.bool_], " lanes"]
+    num_reflections: Shaped[NDArray[np.int32], " lanes"]
+    is_path: Shaped[NDArray[np.bool_], " lanes"]
+    spread: Shaped[F32, " lanes"]
+    distance: Shaped[F32, " lanes"]
+    texture: Shaped[NDArray[np.uint32], "slots lanes"]
+    texel: Shaped[F32, " 3"]
+    emitter: Shaped[NDArray[np.uint16], " lanes"]
+    emission: Shaped[NDArray[np.uint32], " lanes"]
 
 
 @nb.njit(nogil=True, cache=True)
@@ -70,6 +84,9 @@ def allocate_lanes():  # type: ignore[no-untyped-def]
         np.zeros(LANES, np.uint32), np.zeros((6, LANES), np.float32), np.zeros(LANES, np.int32),
         np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros(LANES, np.int32),
         np.zeros((3, LANES), np.float32), np.zeros((3, LANES), np.float32), np.zeros(LANES, np.bool_),
+        np.zeros(LANES, np.int32), np.zeros(LANES, np.bool_), np.zeros(LANES, np.float32), np.zeros(LANES, np.float32),
+        np.zeros((_MAX_SLOTS, LANES), np.uint32), np.zeros(3, np.float32),
+        np.zeros(LANES, np.uint16), np.zeros(LANES, np.uint32),
     )  # fmt: skip
 
 

@@ -21,9 +21,10 @@ from relume.reference.image import reference_image
 from relume.scene.texture_encoding import decode
 
 
-def painted(scene, texture):
-    """The look in which the scene's floor shows a texture and its color is white."""
+def painted(scene, texture, **terms):
+    """The look in which the scene's floor shows a texture and its color is white. terms: of other materials"""
     document = copy.deepcopy(default_look(scene.materials))
+    document["materials"].update({name: {"terms": of_material} for name, of_material in terms.items()})
     first, *others = document["materials"]["Floor"]["terms"]
     document["materials"]["Floor"]["terms"] = [{**first, "color": [1.0, 1.0, 1.0], "texture": texture}, *others]
     return validate(document, default_look(scene.materials))
@@ -56,6 +57,16 @@ def test_pictures_equal_those_of_a_scene_with_the_image(bakes, named):
     )
     assert relative_rmse(render_exact(bare, painted(plain, None), method), expected) > 0.1
     assert relative_rmse(actual, expected) < (1e-3 if method == "probes" else 1e-6)
+
+
+def test_polished_surfaces_reflect_the_image(bakes, named):
+    """The back wall is chrome, and shows the floor: textures of bakes are stored in half precision."""
+    method, (plain, own), (bare, baked) = bakes
+    chrome = [{"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.02, "f0": 0.9}}]
+    actual = render_exact(bare, painted(plain, named, Blue=chrome), method)
+    expected = render_exact(baked, painted(own, "diffuse", Blue=chrome), method)
+    assert relative_rmse(actual, expected) < 1e-3
+    assert relative_rmse(render_exact(bare, painted(plain, None, Blue=chrome), method), expected) > 0.1
 
 
 def test_removing_the_image_restores_the_picture(bakes, named):

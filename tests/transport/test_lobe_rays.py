@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy_reference as ref
 import pytest
+from rgb9e5 import rgb9e5_pack
 
 from relume.assets.environments.equirect import lookup, rotate_about_y
 from relume.brdf.curves import curve_bands, curve_values
@@ -19,9 +20,10 @@ from relume.lights.spherical_triangles import EnvironmentTexels, integrate_envir
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
+from relume.transport.hit_textures import textured_light
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
-from relume.transport.lobe_paths import NO_SURFACES, no_paths
-from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeRays
+from relume.transport.lobe_paths import END, NO_EMITTER, NO_SURFACES, LobePaths, no_paths
+from relume.transport.lobe_rays import NO_EMISSION, NO_ENVIRONMENT, NO_PEAKS, LobeRays
 from relume.transport.outgoing_patch_light import isotropic, no_light
 from relume.transport.shading.shader import Shader
 from relume.transport.shading_points import build_ray_lists
@@ -44,6 +46,12 @@ def view(degrees):
     return normal, wo.astype(np.float32)
 
 
+def untextured(outgoing):
+    """The light of patches without a texture."""
+    shape = 2, len(outgoing.isotropic), 3
+    return textured_light(outgoing.isotropic, np.zeros(shape), np.ones(shape), np.empty(0, np.int64))
+
+
 def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotation=0.0, num_rays=144):
     """Points without occluders, with lobe rays and triangles of an environment."""
     tiles = choose_tiles(radiance, num_lights)
@@ -52,11 +60,13 @@ def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotat
     hits = LobeHits(
         np.full((len(normal), num_rays), NO_HIT, np.uint16),
         np.full((len(normal), -(-num_rays // 8)), 255, np.uint8),
+        np.empty((0, len(normal), num_rays), np.uint32),
         no_paths(len(normal)),
     )
     tile = tile_of_texels(tiles, radiance.shape[:2], rotation)
     environment = lobe_environment(radiance, tile, rotation, lights, radiance, is_direct=True)
-    rays = LobeRays(hits, pattern, no_light(), environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+    patches = no_light(), untextured(no_light())
+    rays = LobeRays(hits, pattern, *patches, environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION)
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), visible)
     return lights, ref.only_above(replace(points, rays=(rays,)), lights)
@@ -147,9 +157,11 @@ def test_rays_that_hit_a_patch_bring_its_light():
     patch[:, ::2] = NO_HIT  # a surface without a patch is black
     light = np.zeros((65_536, 3), np.float32)
     light[7] = 1, 2, 3
-    hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), no_paths(NUM_POINTS))
+    no_texture = np.empty((0, NUM_POINTS, 55), np.uint32)
+    hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), no_texture, no_paths(NUM_POINTS))
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
-    rays = LobeRays(hits, pattern, isotropic(light), NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS)
+    patches = isotropic(light), untextured(isotropic(light))
+    rays = LobeRays(hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION)
     listed = build_ray_lists(rays, points, 0, NUM_POINTS)
     num = int(listed.first[-1])
     assert 0.99 * 27 * NUM_POINTS < num <= 27 * NUM_POINTS  # few leave below the horizon
@@ -157,6 +169,70 @@ def test_rays_that_hit_a_patch_bring_its_light():
     half = listed.wi[:, :num] + listed.wo[:, :num]
     cos_theta_h = half[2] / np.linalg.norm(half, axis=0)
     assert np.degrees(np.arccos(np.clip(np.median(cos_theta_h), 0, 1))) < 1
+
+
+def test_rays_bring_the_light_of_a_patch_times_the_texture_by_its_mean():
+    """Each term with its own texture: the rest of the patch's light has none."""
+    chrome, (normal, wo) = document("ggx", roughness=0.1, f0=1.0), view(40)
+    pattern = make_lobe_pattern(sample_lobe(chrome, NO_LEVELS), 55, 3)
+    patch = np.full((NUM_POINTS, 55), 7, np.uint16)
+    light = np.zeros((65_536, 3), np.float32)
+    light[7] = 1, 2, 4
+    mean, unit_share = np.ones((2, 65_536, 3), np.float32), np.zeros((2, 65_536, 3), np.float32)
+    mean[0, 7], mean[1, 7] = 0.5, 0.25
+    unit_share[0, 7], unit_share[1, 7] = 0.5 / 0.5, 0.3 / 0.25  # half of the light is diffuse, a fifth has no texture
+    texture = np.empty((2, NUM_POINTS, 55), np.uint32)
+    texture[0], texture[1] = rgb9e5_pack(np.float32([1.0, 0.5, 0.0])), rgb9e5_pack(np.float32([0.25, 0.5, 0.0]))
+    hits = LobeHits(patch, np.zeros((NUM_POINTS, 7), np.uint8), texture, no_paths(NUM_POINTS, 2))
+    points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
+    factor = np.array([2 * 0.5 + 0.3 + 0.2, 0.5 + 2 * 0.3 + 0.2, 0.2])
+
+    def listed(textured):
+        patches = isotropic(light), textured
+        rays = LobeRays(
+            hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION
+        )
+        lists = build_ray_lists(rays, points, 0, NUM_POINTS)
+        return lists.irradiance[:, : int(lists.first[-1])].copy()
+
+    plain = listed(untextured(isotropic(light)))
+    textured = listed(textured_light(light, unit_share, mean, np.array([0, 1])))
+    np.testing.assert_allclose(textured, plain * factor[:, None], rtol=0.01)
+
+
+def test_polished_surfaces_reflect_lights_with_their_images():
+    """Every other path of a ray ends on a light."""
+    chrome, (normal, wo) = document("ggx", roughness=0.1, f0=1.0), view(40)
+    pattern = make_lobe_pattern(sample_lobe(chrome, NO_LEVELS), 55, 3)
+    points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
+    paths = LobePaths.allocate(NUM_POINTS, NUM_POINTS * 55, 0)
+    paths.first[:] = 55 * np.arange(NUM_POINTS + 1)
+    paths.ray[:] = np.tile(np.arange(55), NUM_POINTS)
+    paths.kind[:], paths.patch[:], paths.lobe[:] = END, NO_HIT, 0
+    paths.emitter[:] = np.where(paths.ray % 2, NO_EMITTER, 1)
+    paths.emission[:] = rgb9e5_pack(np.float32([0.5, 1, 2]))
+    paths.throughput[:] = 0.5
+    light = np.zeros((65_536, 3), np.float32)
+    light[7] = 1
+
+    def listed(patch_light, paths, emission):
+        hits = LobeHits(
+            np.full((NUM_POINTS, 55), 7, np.uint16), np.zeros((NUM_POINTS, 7), np.uint8),
+            np.empty((0, NUM_POINTS, 55), np.uint32), paths,
+        )  # fmt: skip
+        patches = isotropic(patch_light), untextured(isotropic(patch_light))
+        rays = LobeRays(
+            hits, pattern, *patches, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, emission
+        )
+        lists = build_ray_lists(rays, points, 0, NUM_POINTS)
+        return lists.irradiance[:, : int(lists.first[-1])].copy()
+
+    weight = listed(light, no_paths(NUM_POINTS), NO_EMISSION)[0]
+    reflected = listed(np.zeros_like(light), paths, np.float32([[9, 9, 9], [10, 20, 40]]))
+    is_lit = reflected[0] > 0
+    assert 0.49 < is_lit.mean() < 0.52
+    np.testing.assert_allclose(reflected[:, is_lit], np.outer([2.5, 10, 40], weight[is_lit]), rtol=1e-5)
+    assert not reflected[:, ~is_lit].any()
 
 
 def test_rows_keep_their_rays():

@@ -8,8 +8,9 @@ import pytest
 from rgb9e5 import rgb9e5_pack, rgb9e5_unpack
 
 from relume.core.errors import ParameterError
+from relume.math.rgb9e5 import pack_rgb9e5, unpack_rgb9e5
 from relume.scene.model import Camera
-from relume.views.resolve import encode, pack_rgb9e5, resolve
+from relume.views.resolve import encode, resolve
 from relume.views.view import View
 
 
@@ -107,6 +108,11 @@ def test_the_packing_kernel_equals_numpy_bit_for_bit():
     for rgb in (random, halfway, powers, below, np.eye(3) * 0.9999, rng.integers(0, 70_000, (2000, 3))):
         rgb = np.asarray(rgb, np.float32)
         np.testing.assert_array_equal(packed(rgb), rgb9e5_pack(rgb))
+
+
+def test_the_unpacking_kernel_equals_numpy():
+    words = np.random.default_rng(3).integers(0, 1 << 32, 5000).astype(np.uint32)
+    np.testing.assert_array_equal([unpack_rgb9e5(word) for word in words], rgb9e5_unpack(words))
 
 
 HOSTILE = [

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
+from relume.math.rgb9e5 import pack_rgb9e5
 from relume.probes.stored_scene import StoredScene
-from relume.views.resolve import pack_rgb9e5
 
 F32 = NDArray[np.float32]
 

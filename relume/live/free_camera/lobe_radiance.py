@@ -24,6 +24,7 @@ from relume.live.free_camera.environment_lookup import add_environment, blur_lev
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.normal_mapping import normalize
 from relume.math.fast_math import acos_clamped
+from relume.math.rgb9e5 import unpack_rgb9e5
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import (
     LobePattern,
@@ -42,9 +43,9 @@ from relume.raytrace.ray_packet import (
     set_origin,
     trace_shadows,
 )
-from relume.transport.lobe_hits import jittered_frame, lobe_ray_in_pixel, trace_lobe_rays
-from relume.transport.lobe_paths import ESCAPE, REFLECTION
-from relume.transport.lobe_rays import from_patch, spread_of
+from relume.transport.lobe_hits import half_vector_spread, jittered_frame, lobe_ray_in_pixel, trace_lobe_rays
+from relume.transport.lobe_paths import ESCAPE, REFLECTION, TRANSMISSION
+from relume.transport.lobe_rays import from_patch, isotropic_at, texels_at
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.patch_lookup import tangents_of
 from relume.transport.shading_points import LocalRays, ShadingPoints, build_ray_lists
@@ -89,32 +90,45 @@ def _add_escaping(environment, sigma, world, gain, scratch, out):  # type: ignor
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _add_path(paths, first, last, outgoing, surfaces, environment, scratch, out):  # type: ignore[no-untyped-def]
-    """Add the light at the end of a path, its entries [first, last). scratch, out: (3,)"""
+def _add_path(paths, first, last, light_args, environment, direct, scratch, out):  # type: ignore[no-untyped-def]
+    """Add the light along a path, its entries [first, last).
+
+    Args:
+        light_args: outgoing, textured, emission and surfaces of `LobeScene`. environment: `PrefilteredEnvironment`.
+        direct: radiance of the environment along the ray. (3,) scratch, out: (3,)
+    """
+    outgoing, textured, emission, surfaces = light_args
     for entry in range(first, last):
         kind, patch, lobe, d = paths.kind[entry], paths.patch[entry], paths.lobe[entry], paths.direction[entry]
-        gain, world = paths.throughput[entry], (d[0], d[1], d[2])
+        gain, world, emitter = paths.throughput[entry], (d[0], d[1], d[2]), paths.emitter[entry]
         if kind == ESCAPE:
             blur = surfaces.blur[lobe]
             _add_escaping(environment, (blur, blur), world, (gain[0], gain[1], gain[2]), scratch, out)
+        elif kind == TRANSMISSION:
+            for channel in range(3):
+                out[channel] += gain[channel] * direct[channel]
         elif kind != REFLECTION and patch != NO_PATCH:
-            light = from_patch(outgoing, patch, world)
+            light = from_patch(outgoing, textured, patch, texels_at(textured, paths.texture[entry]), world)
             for channel in range(3):
                 out[channel] += gain[channel] * light[channel]
+        if emitter < emission.shape[0]:
+            image = unpack_rgb9e5(paths.emission[entry])
+            for channel in range(3):
+                out[channel] += gain[channel] * emission[emitter, channel] * image[channel]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _mean_radiance(points, wo, footprint, hits, pattern, scene, environment, sigma, is_direct, start, stop, out):  # type: ignore[no-untyped-def]
+def _mean_radiance(points, wo, footprint, hits, pattern, light_args, environment, sigma, is_direct, start, stop, out):  # type: ignore[no-untyped-def]
     """Average the light of the rays of points [start, stop).
 
     Args:
         points: `SurfacePoints`. wo: view directions. footprint: of each point, or one. hits: fields of `LobeHits`.
-        pattern: `LobePattern`. scene: outgoing, broad_share and surfaces of `LobeScene`.
+        pattern: `LobePattern`. light_args: outgoing, textured, emission, surfaces and broad_share of `LobeScene`.
         environment: `PrefilteredEnvironment`. sigma: its blurs for core and tail, radians.
         is_direct: whether rays that leave the scene at once bring light. out: written. (n, 3)
     """
-    (patch, escapes, paths), (outgoing, broad_share, surfaces) = hits, scene
-    light, scratch = np.empty(3, np.float32), np.empty(3, np.float32)
+    (patch, escapes, texture, paths), (outgoing, textured, emission, surfaces, broad_share) = hits, light_args
+    light, direct, scratch = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     gain = (_ONE, _ONE, _ONE) if is_direct else (_ZERO, _ZERO, _ZERO)
     for p in range(start, stop):
         shift, path, last_path, num = lobe_shift(pattern, points.seed[p]), paths.first[p], paths.first[p + 1], 0
@@ -134,11 +148,16 @@ def _mean_radiance(points, wo, footprint, hits, pattern, scene, environment, sig
             if (escapes[p, ray >> 3] >> (ray & 7)) & 1:
                 _add_escaping(environment, sigma, world, gain, scratch, light)
             elif path > first_entry:
-                _add_path(paths, first_entry, path, outgoing, surfaces, environment, scratch, light)
+                direct[0] = direct[1] = direct[2] = 0
+                if paths.kind[path - 1] == TRANSMISSION:
+                    _add_escaping(environment, sigma, world, gain, scratch, direct)
+                path_args = (outgoing, textured, emission, surfaces), environment, direct
+                _add_path(paths, first_entry, path, *path_args, scratch, light)
+                from_hit = isotropic_at(textured, hit, texels_at(textured, texture[:, p, ray]))
                 for channel in range(3):
-                    light[channel] += broad_share[hit] * outgoing.isotropic[hit, channel]
+                    light[channel] += broad_share[hit] * from_hit[channel]
             elif hit != NO_PATCH:
-                from_hit = from_patch(outgoing, hit, world)
+                from_hit = from_patch(outgoing, textured, hit, texels_at(textured, texture[:, p, ray]), world)
                 for channel in range(3):
                     light[channel] += from_hit[channel]
         scale = _ONE / np.float32(max(num, 1))
@@ -179,13 +198,14 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):
     Whichever is wider, lobe or disk, is evaluated at directions from the other.
 
     Args:
-        points, p: the point. wo: view directions. footprint: of the point. pattern: `LobePattern`.
+        points, p: the point. wo: view directions. footprint: of each point, or one. pattern: `LobePattern`.
         widths: median and 99.9th percentile of the angles of ωi to the mirror direction, radians.
         direction: center of the disk, a tuple. radius: radians.
     """
-    normal, spread, seed = points.normal[p], spread_of(footprint), points.seed[p]
+    normal, spread, seed = points.normal[p], half_vector_spread(footprint, p), points.seed[p]
+    part = footprint[min(p, footprint.shape[0] - 1)]
     cosine = normal[0] * wo[p, 0] + normal[1] * wo[p, 1] + normal[2] * wo[p, 2]
-    mirrored = -_ZERO
+    mirrored = _ZERO
     for axis in range(3):
         mirrored += direction[axis] * (_TWO * cosine * normal[axis] - wo[p, axis])
     if acos_clamped(mirrored) > radius + widths[1] + _TWO * spread:
@@ -196,7 +216,7 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):
     cos_radius, sin_radius, total = np.float32(math.cos(radius)), np.float32(math.sin(radius)), _ZERO
     for k in range(num):
         u, v = ray_jitter(k, seed)
-        (t, b, n), o = jittered_frame(normal, points.tangent[p], wo[p], footprint, u - _HALF, v - _HALF)
+        (t, b, n), o = jittered_frame(normal, points.tangent[p], wo[p], part, u - _HALF, v - _HALF)
         r, azimuth = ray_jitter(k, np.uint32(seed) ^ _DIRECTION_SEED)
         if is_wide:
             r, azimuth = sin_radius * np.float32(math.sqrt(r)), _TWO * _PI * azimuth
@@ -228,9 +248,9 @@ def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environme
             width, num_lit = min(LANES, stop - first), 0
             for lane in range(LANES):
                 p = first + min(lane, width - 1)
-                position, part = points.position[p], footprint[min(p, footprint.shape[0] - 1)]
+                position = points.position[p]
                 density[lane] = (
-                    _mean_density(points, p, wo, part, pattern, widths, d, radius) if lane < width else _ZERO
+                    _mean_density(points, p, wo, footprint, pattern, widths, d, radius) if lane < width else _ZERO
                 )
                 set_origin(packet, lane, position[0], position[1], position[2])
                 set_direction(packet, lane, d[0], d[1], d[2], np.float32(np.inf))
@@ -282,8 +302,16 @@ def mean_lobe_radiance(
     hits = trace_lobe_rays(scene.geometry, scene.lookup, scene.surfaces, *point_args, None, core)
     out = np.empty((points.num_points, 3), np.float32)
     sigma = _CORE_BLUR * lobe_width, _TAIL_BLUR * lobe_width
-    scene_args = scene.outgoing, scene.broad_share, scene.surfaces
-    args = *point_args, (hits.patch, hits.escapes, hits.paths), core, scene_args, environment, sigma, is_direct
+    light_args = scene.outgoing, scene.textured, scene.emission, scene.surfaces, scene.broad_share
+    args = (
+        *point_args,
+        (hits.patch, hits.escapes, hits.texture, hits.paths),
+        core,
+        light_args,
+        environment,
+        sigma,
+        is_direct,
+    )
     parallel_for_chunks(lambda start, stop: _mean_radiance(*args, start, stop, out), points.num_points)
     return out
 

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from relume.core.color import LUMINANCE
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.free_camera.texture_kernels import sample_texture
 from relume.math.zernike import basis_functions
 from relume.probes.stored_scene import StoredScene
+from relume.raytrace.texture_kernels import sample_texture
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

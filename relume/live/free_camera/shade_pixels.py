@@ -22,8 +22,9 @@ from relume.live.free_camera.highlights.environment_lobe_lookup import (
 )
 from relume.live.free_camera.normal_mapping import normal_tilt, normalize, shading_ratio
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.texture_kernels import sample_texture
-from relume.probes.stored_scene import EMISSION, NORMAL_MAP, StoredScene
+from relume.probes.stored_scene import StoredScene
+from relume.raytrace.surface_textures import EMISSION, NORMAL_MAP
+from relume.raytrace.texture_kernels import sample_texture
 
 F32 = NDArray[np.float32]
 

@@ -21,7 +21,7 @@ from relume.live.free_camera.highlights.environment_lobe_lookup import Prefilter
 from relume.live.free_camera.lobe_radiance import add_direct_lights, lobe_widths, mean_lobe_radiance
 from relume.live.free_camera.lobe_terms import TracedLobe
 from relume.raytrace.lobe_directions import make_lobe_pattern
-from relume.transport.lobe_rays import spread_of
+from relume.transport.lobe_hits import half_vector_spread
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.shading_points import LocalRays, ShadingPoints
 
@@ -67,7 +67,7 @@ def _share(row_of_pixel, width, pixel, points, wo, footprint, lobe_width, radian
     for p in range(start, stop):
         y = pixel[p] // width
         x, n, position, r = pixel[p] - y * width, points.normal[p], points.position[p], _mirror_direction(points, p, wo)
-        spread = spread_of(footprint[p])
+        spread = half_vector_spread(footprint, p)
         sharpness = _ONE / (_SHARED_PART * (lobe_width * lobe_width + spread * spread) + np.float32(1e-12))
         total = _ZERO
         for row in range(max(y - _REACH, 0), min(y + _REACH + 1, height)):

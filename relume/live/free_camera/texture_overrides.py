@@ -10,10 +10,8 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import EmissionImage, Images, NormalMap
-from relume.images.image_store import load_emission_image, load_normal_map, load_texture
-from relume.probes.stored_scene import MAX_TEXTURE_SIDE, StoredScene, Textures, concatenate_textures
-from relume.raytrace.surface_interaction import triplanar_axes
-from relume.scene.model import WRAPS, Texture
+from relume.probes.stored_scene import StoredScene
+from relume.raytrace.surface_textures import TextureCoordinates, Textures, project_missing, replace_textures
 
 F32 = NDArray[np.float32]
 
@@ -54,37 +52,17 @@ def overridden_textures(
     Raises:
         NotFoundError, SceneError: an image cannot be loaded.
     """
-    names = list(dict.fromkeys(name for override in overrides for name in override.columns if name is not None))
-    override_textures = list(map(_load_texture, names))
-    baked_textures, override_levels = stored_scene.textures, concatenate_textures(override_textures, MAX_TEXTURE_SIDE)
-    wraps = np.array([[WRAPS.index(wrap) for wrap in texture.wrap] for texture in override_textures], np.int64).reshape(
-        -1, 2
+    baked = TextureCoordinates(stored_scene.uvs, stored_scene.uv_faces, stored_scene.uv_scale)
+    is_overridden = np.array([override != NO_OVERRIDES for override in overrides])
+    coordinates = project_missing(
+        baked, positions, stored_scene.faces, stored_scene.face_normal, is_overridden[stored_scene.face_material]
     )
-    material_textures = baked_textures.material_textures.copy()
-    for material, override in enumerate(overrides):
-        for column, name in enumerate(override.columns):
-            if name is not None:
-                material_textures[material, column] = len(baked_textures.wraps) + names.index(name)
-    textures = Textures(
-        np.concatenate([baked_textures.texels, override_levels.texels]),
-        np.concatenate([baked_textures.levels, override_levels.levels + np.array([len(baked_textures.texels), 0, 0])]),
-        np.concatenate([baked_textures.first, baked_textures.first[-1] + override_levels.first[1:]]),
-        np.concatenate([baked_textures.wraps, wraps]),
-        material_textures,
-    )
-    uvs, uv_faces, uv_scale = _project_uvs(
-        stored_scene, positions, np.array([override != NO_OVERRIDES for override in overrides])
-    )
+    textures = replace_textures(stored_scene.textures, [override.columns for override in overrides])
+    uvs, uv_faces, uv_scale = coordinates
     has_normal_map = np.array([override.normals is not None for override in overrides])
     return OverriddenTextures(
         textures, uvs, uv_faces, uv_scale, _tangents(stored_scene, positions, uvs[uv_faces], has_normal_map)
     )
-
-
-def _load_texture(name: str | NormalMap | EmissionImage) -> Texture:
-    if isinstance(name, EmissionImage):
-        return load_emission_image(name)
-    return load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name)
 
 
 def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, has_normal_map: NDArray[np.bool_]) -> F32:
@@ -111,24 +89,3 @@ def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, ha
     out[is_defined, :3] = total[is_defined, :3] / length[is_defined, None]
     out[is_defined, 3] = np.where(total[is_defined, 3] < 0, -1, 1)
     return out
-
-
-def _project_uvs(
-    stored_scene: StoredScene, positions: F32, has_images: NDArray[np.bool_]
-) -> tuple[F32, NDArray[np.uint32], F32]:
-    """Compute missing texture coordinates by tri-planar projection, one texture unit per meter.
-
-    Returns:
-        Fields `uvs`, `uv_faces` and `uv_scale` of the scene.
-    """
-    flat = np.flatnonzero((stored_scene.uv_scale == 0) & has_images[stored_scene.face_material])
-    if not len(flat):
-        return stored_scene.uvs, stored_scene.uv_faces, stored_scene.uv_scale
-    across, up = triplanar_axes(stored_scene.face_normal[flat])
-    corners = positions[stored_scene.faces[flat]]
-    u, v = np.einsum("fkc,fc->fk", corners, across), -np.einsum("fkc,fc->fk", corners, up)
-    uvs = np.concatenate([stored_scene.uvs, np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)])
-    uv_faces, uv_scale = stored_scene.uv_faces.copy(), stored_scene.uv_scale.copy()
-    uv_faces[flat] = len(stored_scene.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
-    uv_scale[flat] = 1
-    return uvs, uv_faces, uv_scale

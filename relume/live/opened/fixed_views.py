@@ -31,10 +31,12 @@ from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQualit
 from relume.live.opened.few_lobe_rays import FewLobeRays
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import (
+    LobePatches,
     LobeTracer,
     choose_peaks,
     lobe_environment,
     narrow_surfaces,
+    no_lobe_patches,
     only_broad,
     tile_of_texels,
     trace_lobes,
@@ -258,14 +260,14 @@ class BakedFixedViews:
         is_canceled: Callable[[], bool],
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
-        pattern = self._lobe_tracer.pattern(lobe)
-        narrow = narrow_surfaces(_reflecting(light))
-        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow))
+        pattern, images = self._lobe_tracer.pattern(lobe), tuple(material.images for material in light.reflectances)
+        narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
+        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow, images))
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
         environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
-        light_args = scene.outgoing, environment, scene.broad_share
-        return LobeRays(hits, pattern, *light_args, footprint, scene.surfaces, peaks)
+        light_args = scene.outgoing, scene.textured, environment, scene.broad_share
+        return LobeRays(hits, pattern, *light_args, footprint, scene.surfaces, peaks, scene.emission)
 
     @cached_property
     def few_lobe_rays(self) -> FewLobeRays:
@@ -280,13 +282,22 @@ class BakedFixedViews:
         Raises:
             CancelledError: `is_canceled` returned true.
         """
-        reflectances = _reflecting(light)
-        tint, share = self._lobe_patches(reflectances)
-        return self._lobe_tracer.scene(reflectances, tint, share, self._patch_light(light, is_canceled))
+        reflectances = light.reflectances
+        goes_on = light.paths.has_all_bounces and bool(narrow_surfaces(reflectances))
+        light_args = self._patch_light(light, is_canceled), self._mesh_emission(light)
+        return self._lobe_tracer.scene(reflectances, self._lobe_patches(reflectances), *light_args, goes_on=goes_on)
 
-    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
-        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
-        return np.ones((NO_PATCH + 1, 3), np.float32), np.ones(NO_PATCH + 1, np.float32)
+    def _mesh_emission(self, light: Illumination) -> Shaped[F32, "materials 3"]:
+        """Return the radiance of the surfaces of each material that is a light; its image is relative to it."""
+        emission = np.zeros((len(self.material_names), 3), np.float32)
+        for geometry, gain in light.local:
+            if geometry.kind == "mesh":
+                emission[self.material_names.index(geometry.material)] += np.array(gain, np.float32)
+        return emission
+
+    def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
+        """Return the textures and reflectances of patches, for lobe rays: there are none."""
+        return no_lobe_patches()
 
     def _lobe_environment(self, light: Illumination) -> tuple[LobeEnvironment, LobePeaks]:
         key, rotation = light.environment, light.environment.rotation
@@ -488,11 +499,6 @@ class SelectedSamples:
     def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
         """Return the rays of local lights; shadows are traced."""
         return self.local.rays_to(light, points)
-
-
-def _reflecting(light: Illumination) -> Reflectances:
-    """Return the reflectances of the surfaces that lobe rays go on from; none if not all bounces are shown."""
-    return light.reflectances if light.paths.has_all_bounces else ()
 
 
 def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:

@@ -12,14 +12,13 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import Reflectances
-from relume.brdf.texture_slots import TEXTURES
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
 from relume.live.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples, read_fields
 from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
-from relume.live.opened.lobe_light import broad_share
+from relume.live.opened.lobe_light import LobePatches, broad_share
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.live.opened.planar_mirror_light import MirrorLightTransfer
@@ -34,6 +33,8 @@ from relume.transport.shading_points import GatherRays, RayList
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
+
+_LEAST_REFLECTANCE = np.float32(1e-12)  # of a black patch
 
 
 @dataclass(frozen=True)
@@ -119,14 +120,17 @@ class BakedIndirectViews(BakedFixedViews):
         """Return the exact outgoing light of patches."""
         return self.indirect.outgoing_light(light, is_canceled) if light.paths.has_indirect else no_light()
 
-    def _lobe_patches(self, reflectances: Reflectances) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, " patches"]]:
-        """Return the mean specular texture of each patch, and the share of its radiance of broad terms."""
-        tint, share = super()._lobe_patches(reflectances)
+    def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
+        """Return the textures and reflectances of patches, for lobe rays."""
+        out, material, num = super()._lobe_patches(reflectances), self.patches.material, self.patches.num_patches
         if reflectances:
-            material, num = self.patches.material, self.patches.num_patches
-            tint[:num] = self.patches.texture_multipliers(reflectances)[TEXTURES.index("specular")]
-            share[:num] = np.array([broad_share(reflectance) for reflectance in reflectances], np.float32)[material]
-        return tint, share
+            of_material = np.stack([reflectance.matrix[:, :, 0] for reflectance in reflectances], axis=1)[:, material]
+            out.mean[:, :num] = self.patches.texture_multipliers(reflectances)
+            total = of_material[0] + (out.mean[:, :num] * of_material[1:]).sum(axis=0)
+            out.unit_share[:, :num] = of_material[1:] / np.maximum(total, _LEAST_REFLECTANCE)
+            broad = np.array([broad_share(reflectance) for reflectance in reflectances], np.float32)
+            out.broad_share[:num] = broad[material]
+        return out
 
     def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
         """Return the fraction of each patch's points that see some light triangles."""

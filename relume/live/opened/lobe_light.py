@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -19,17 +20,28 @@ from relume.assets.environments.equirect import (
 from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
 from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS
-from relume.core.errors import StoreError
+from relume.brdf.texture_slots import TEXTURES, Images
+from relume.core.errors import ChunkDamagedError, StoreError
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.opened.retrace import NormalRetracer
 from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
+from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
+from relume.raytrace.surface_textures import (
+    TextureCoordinates,
+    Textures,
+    project_missing,
+    read_textures,
+    replace_textures,
+    texture_coordinates,
+)
 from relume.store.bake_protocol import StoreReader
+from relume.transport.hit_textures import NO_TEXTURES, HitTextures, hit_textures, row_of_slot, textured_light
 from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
 from relume.transport.lobe_paths import LobeSurfaces
-from relume.transport.lobe_rays import LobeEnvironment
+from relume.transport.lobe_rays import NO_EMISSION, LobeEnvironment
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.patch_lookup import PatchLookup, patch_reach
@@ -45,6 +57,26 @@ _BLUR = 1.5  # of the environment behind a second lobe, by the median of its hal
 _NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
 
 
+class LobePatches(NamedTuple):
+    """Textures and reflectances of patches, for lobe rays.
+
+    Attributes:
+        mean: of each of `TEXTURES` on each patch.
+        unit_share: share of the terms with each texture in a patch's reflectance, divided by the mean.
+        broad_share: share of a patch's isotropic radiance that its narrow lobe does not reflect.
+    """
+
+    mean: Shaped[F32, "2 patches 3"]
+    unit_share: Shaped[F32, "2 patches 3"]
+    broad_share: Shaped[F32, " patches"]
+
+
+def no_lobe_patches() -> LobePatches:
+    """Return the textures and reflectances of a scene without patches."""
+    shape = len(TEXTURES), NO_PATCH + 1, 3
+    return LobePatches(np.ones(shape, np.float32), np.zeros(shape, np.float32), np.ones(NO_PATCH + 1, np.float32))
+
+
 class LobeTracer:
     """Traces lobe rays from samples of a bake.
 
@@ -54,6 +86,7 @@ class LobeTracer:
 
     def __init__(self, store: StoreReader, tracer: NormalRetracer) -> None:
         self._store, self._tracer = store, tracer
+        self._textures_with = lru_cache(maxsize=1)(self._replace_textures)  # a look's are as large as the baked ones
 
     def pattern(self, lobe: LobeSampling) -> LobePattern:
         """Return the rays of every sample: fewer for a narrow lobe."""
@@ -63,25 +96,34 @@ class LobeTracer:
     def scene(
         self,
         reflectances: Reflectances,
-        tint: Shaped[F32, "patches 3"],
-        broad_share: Shaped[F32, " patches"],
+        patches: LobePatches,
         outgoing: OutgoingLight,
+        emission: Shaped[F32, "materials 3"],
+        *,
+        goes_on: bool,
     ) -> LobeScene:
         """Return the surfaces that lobe rays meet. See `LobeScene`.
 
         Args:
-            reflectances: of all materials. Empty: rays end at the first surface.
-            tint: mean of the specular texture of each patch. broad_share, outgoing: as in `LobeScene`.
+            reflectances: of all materials. patches: their textures and reflectances.
+            outgoing, emission: as in `LobeScene`. goes_on: rays go on from narrow lobes.
         """
-        surfaces = self._surfaces(reflectances if any(narrow_surfaces(reflectances)) else (), tint)
-        return LobeScene(self._tracer.geometry, self._lookup, surfaces, outgoing, broad_share)
+        images = tuple(material.images for material in reflectances)
+        tint = patches.mean[TEXTURES.index("specular")]
+        surfaces = self._surfaces(reflectances if goes_on else (), tint, images)
+        textured = textured_light(outgoing.isotropic, patches.unit_share, patches.mean, surfaces.textures.slots)
+        light_args = outgoing, textured, patches.broad_share, emission if goes_on else NO_EMISSION
+        return LobeScene(self._tracer.geometry, self._lookup, surfaces, *light_args)
 
-    def _surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"]) -> LobeSurfaces:
-        """Return the surfaces that rays go on from: those with narrow lobes."""
+    def _surfaces(
+        self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: tuple[Images, ...]
+    ) -> LobeSurfaces:
+        """Return the surfaces that rays meet; those of `reflectances` with narrow lobes pass rays on."""
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
+        textures = self._textures_with(images)
         materials = [index for index, lobe in enumerate(lobes) if lobe is not None][:_MAX_LOBES]
         found = [lobe for lobe in lobes if lobe is not None][:_MAX_LOBES]
-        row = np.full(len(reflectances), -1, np.int32)
+        row = np.full(len(self._store.attributes["materials"]), -1, np.int32)
         row[materials] = np.arange(len(materials))
         quantile, band_density = (
             _padded([lobe.quantile[0] for lobe, _ in found]),
@@ -103,8 +145,46 @@ class LobeTracer:
             ),
             blur=np.asarray(np.where(median > _WIDE, _BLUR * median, 0), np.float32),
             tint=tint,
+            textures=textures,
+            specular=row_of_slot(textures.slots, TEXTURES.index("specular")),
+            glass=self._glass,
+            is_two_sided=np.array(self._store.attributes["double_sided"], np.bool_),
             offset=geometry.epsilon,
         )
+
+    def _replace_textures(self, images: tuple[Images, ...]) -> HitTextures:
+        """Return the textures of all surfaces. images: of the look, for each material"""
+        if self._textures is None:
+            return NO_TEXTURES
+        baked, coordinates = self._textures
+        textures, geometry = replace_textures(baked, images), self._tracer.geometry
+        has_texture = (textures.material_textures[:, : len(TEXTURES)] >= 0).any(axis=1)
+        mesh_args = geometry.positions, geometry.faces, geometry.face_normals, has_texture[geometry.face_material]
+        return hit_textures(textures, project_missing(coordinates, *mesh_args))
+
+    @cached_property
+    def _textures(self) -> tuple[Textures, TextureCoordinates] | None:
+        """Textures as baked, and their coordinates; None for a store without them."""
+        geometry = self._tracer.geometry
+        try:
+            textures, uvs = read_textures(self._store), self._store.read("scene/uvs")
+        except ChunkDamagedError:
+            raise
+        except StoreError:
+            return None
+        return textures, texture_coordinates(uvs, geometry.positions, geometry.faces)
+
+    @cached_property
+    def _glass(self) -> Shaped[F32, "materials 4"]:
+        """Glass of all materials, see `LobeSurfaces`."""
+        alpha_test = self._tracer.geometry.embree.alpha_test
+        if alpha_test is None or not np.any(alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE):
+            return np.empty((0, 4), np.float32)
+        row, rules = alpha_test.alpha_masks.material_rule, alpha_test.alpha_masks.rules
+        materials = np.flatnonzero((row >= 0) & (rules[row, 0] == GLASS_RULE))
+        glass = np.full((len(row), 4), -1, np.float32)
+        glass[materials] = rules[row[materials], 1:5]
+        return glass
 
     @cached_property
     def _normals(self) -> F32:

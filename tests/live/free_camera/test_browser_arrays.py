@@ -9,8 +9,8 @@ from relume.live.free_camera.basis.material_tables import build_tables
 from relume.live.free_camera.browser import geometry_arrays, material_arrays
 from relume.live.free_camera.frame import MaterialState
 from relume.math.zernike import DEGREE, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
-from relume.probes.stored_scene import Textures
 from relume.probes.triangle_grids import ProbeGrid, node_index, num_nodes
+from relume.raytrace.surface_textures import Textures
 
 SEED = 11
 LAMBERT = {"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "curves": {}, "texture": None}

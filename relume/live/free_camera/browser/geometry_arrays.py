@@ -22,8 +22,9 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
 from relume.live.free_camera.normal_mapping import basis_gradients
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import NUM_FUNCTIONS, recurrence
-from relume.probes.stored_scene import StoredScene, Textures
+from relume.probes.stored_scene import StoredScene
 from relume.probes.triangle_grids import ProbeGrid, num_nodes
+from relume.raytrace.surface_textures import Textures
 
 Texels = NDArray[Any]
 

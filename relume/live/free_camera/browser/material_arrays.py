@@ -24,7 +24,7 @@ from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLight
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, lobe_widths
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
-from relume.probes.stored_scene import EMISSION, NORMAL_MAP
+from relume.raytrace.surface_textures import EMISSION, NORMAL_MAP
 from relume.views.resolve import encode_pixels
 
 F32 = NDArray[np.float32]

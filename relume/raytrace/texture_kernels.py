@@ -1,4 +1,4 @@
-"""Texture lookup in kernels of the free camera, equal to `relume.raytrace.texture`."""
+"""Texture lookup in kernels, equal to `relume.raytrace.texture`."""
 
 from __future__ import annotations
 

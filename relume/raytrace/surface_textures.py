@@ -1,0 +1,240 @@
+"""Textures of a scene as a store has them, and the texture coordinates of its triangles, for lookups at ray hits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.brdf.texture_slots import TEXTURES, EmissionImage, NormalMap
+from relume.core.errors import ChunkDamagedError, StoreError
+from relume.images.image_store import load_emission_image, load_normal_map, load_texture
+from relume.raytrace.surface_interaction import triplanar_axes
+from relume.raytrace.texture import MipMap
+from relume.scene.model import WRAPS, Scene, Texture
+from relume.store.bake_protocol import StoreReader
+
+F32 = NDArray[np.float32]
+
+MAX_TEXTURE_SIDE = 2048  # finer mip levels are not stored
+_MAX_TEXELS = 1 << 25  # of all finest levels together; 12 bytes each
+NORMAL_MAP, EMISSION = len(TEXTURES), len(TEXTURES) + 1  # their columns in `Textures.of_material`
+_MAX_VALUE = 6e4  # of half precision
+
+
+def texture_attributes(scene: Scene) -> dict[str, Any]:
+    """Return the attributes of a store that describe the textures of a scene's materials.
+
+    They are the texture of each material in each of `TEXTURES`, its normal map and its emission image, −1 for none, and
+    the wrap modes of each texture.
+    """
+    index = {id(texture): k for k, texture in enumerate(_textures_of(scene))}
+
+    def index_of(texture: Texture | None) -> int:
+        return -1 if texture is None else index[id(texture)]
+
+    return {
+        "textures": [[index_of(m.textures.get(name)) for name in TEXTURES] for m in scene.materials],
+        "normal_maps": [index_of(m.normal_map) for m in scene.materials],
+        "emission_images": [index_of(m.textures.get("emission")) for m in scene.materials],
+        "wraps": [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in _textures_of(scene)],
+    }
+
+
+def texture_arrays(scene: Scene) -> dict[str, NDArray[Any]]:
+    """Return the textures of a scene as arrays of a store: each once, at most `MAX_TEXTURE_SIDE` wide and high.
+
+    Returns:
+        "textures/<k>", (height, width, 3) float16.
+    """
+    textures = _textures_of(scene)
+    side = _max_side(textures)
+    finest = [np.minimum(_level_pixels(texture, side), _MAX_VALUE) for texture in textures]
+    return {f"textures/{k}": pixels.astype(np.float16) for k, pixels in enumerate(finest)}
+
+
+def _textures_of(scene: Scene) -> list[Texture]:
+    """Return the textures of a scene's materials, each once."""
+    textures = (
+        texture
+        for m in scene.materials
+        for texture in (*(m.textures.get(name) for name in TEXTURES), m.normal_map, m.textures.get("emission"))
+    )
+    return list({id(texture): texture for texture in textures if texture is not None}.values())
+
+
+def _max_side(textures: Sequence[Texture]) -> int:
+    """Largest texture side for which all textures together have at most `_MAX_TEXELS`."""
+    side, pyramids = MAX_TEXTURE_SIDE, [MipMap.for_texture(texture) for texture in textures]
+    while side > 1 and sum(p.levels[_level_index(p, side)].size // 3 for p in pyramids) > _MAX_TEXELS:
+        side //= 2
+    return side
+
+
+def _level_pixels(texture: Texture, side: int) -> F32:
+    pyramid = MipMap.for_texture(texture)
+    return pyramid.level(_level_index(pyramid, side))
+
+
+def _level_index(pyramid: MipMap, side: int) -> int:
+    return next(k for k, level in enumerate(pyramid.levels) if max(level.shape[:2]) <= side)
+
+
+class Textures(NamedTuple):
+    """All textures with their mip levels, concatenated.
+
+    Attributes:
+        levels: first texel, height and width of each level, finest first. first: first level of each texture; one more
+            at the end. wraps: wraps of u and v: repeat, mirror, clamp.
+        material_textures: texture of each material in each of `TEXTURES`, its normal map, its emission image; −1 for
+            none.
+    """
+
+    texels: Shaped[F32, "texels 3"]
+    levels: Shaped[NDArray[np.int64], "levels 3"]
+    first: Shaped[NDArray[np.int64], " textures_and_end"]
+    wraps: Shaped[NDArray[np.int64], "textures 2"]
+    material_textures: Shaped[NDArray[np.int64], "materials 4"]
+
+
+def read_textures(store: StoreReader) -> Textures:
+    """Read the textures of a store.
+
+    Raises:
+        StoreError: it does not describe them. ChunkDamagedError: its description does not match.
+    """
+    try:
+        channel_textures = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
+        # absent in older stores
+        emission_textures = store.attributes.get("emission_images", [-1] * len(channel_textures))
+        material_textures = np.column_stack(
+            [channel_textures, np.array([store.attributes["normal_maps"], emission_textures], np.int64).T]
+        )
+        wraps = np.array(store.attributes["wraps"], np.int64).reshape(-1, 2)
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"the store does not describe its textures ({error}); bake the scene again") from error
+    if material_textures.size and not -1 <= material_textures.min() <= material_textures.max() < len(wraps):
+        raise ChunkDamagedError("textures", "a material has a texture that the store has not")
+    textures = (Texture(store.read(f"textures/{k}").astype(np.float32)) for k in range(len(wraps)))
+    return Textures(*concatenate_textures(textures), wraps, material_textures)
+
+
+class ConcatenatedTextures(NamedTuple):
+    """Mip levels of textures, concatenated as in `Textures`."""
+
+    texels: F32
+    levels: NDArray[np.int64]
+    first: NDArray[np.int64]
+
+
+def concatenate_textures(textures: Iterable[Texture], max_side: int = MAX_TEXTURE_SIDE) -> ConcatenatedTextures:
+    """Concatenate textures with their mip levels.
+
+    Args:
+        textures: in order. max_side: texels; levels that are wider or higher are omitted.
+    """
+    texels, levels, first, end = [np.empty((0, 3), np.float32)], [], [0], 0
+    for texture in textures:
+        pyramid = MipMap.for_texture(texture)
+        for level in map(pyramid.level, range(_level_index(pyramid, max_side), len(pyramid.levels))):
+            levels.append((end, *level.shape[:2]))
+            texels.append(level.reshape(-1, 3))
+            end += len(texels[-1])
+        first.append(len(levels))
+    return ConcatenatedTextures(
+        np.concatenate(texels), np.array(levels, np.int64).reshape(-1, 3), np.array(first, np.int64)
+    )
+
+
+MapName = str | NormalMap | EmissionImage
+"""Of an image in a look."""
+
+
+def _load_texture(name: MapName) -> Texture:
+    if isinstance(name, EmissionImage):
+        return load_emission_image(name)
+    return load_normal_map(name) if isinstance(name, NormalMap) else load_texture(name)
+
+
+def replace_textures(textures: Textures, names: Sequence[Sequence[MapName | None]]) -> Textures:
+    """Replace textures of materials by those of a look.
+
+    Args:
+        textures: as baked. names: for each material, of the first columns of `material_textures`; None keeps one.
+    Raises:
+        NotFoundError, SceneError: an image cannot be loaded.
+    """
+    distinct = list(dict.fromkeys(name for row in names for name in row if name is not None))
+    if not distinct:
+        return textures
+    loaded = list(map(_load_texture, distinct))
+    added = concatenate_textures(loaded, MAX_TEXTURE_SIDE)
+    wraps = [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in loaded]
+    material_textures = textures.material_textures.copy()
+    for material, row in enumerate(names):
+        for column, name in enumerate(row):
+            if name is not None:
+                material_textures[material, column] = len(textures.wraps) + distinct.index(name)
+    return Textures(
+        np.concatenate([textures.texels, added.texels]),
+        np.concatenate([textures.levels, added.levels + np.array([len(textures.texels), 0, 0])]),
+        np.concatenate([textures.first, textures.first[-1] + added.first[1:]]),
+        np.concatenate([textures.wraps, np.array(wraps, np.int64)]),
+        material_textures,
+    )
+
+
+class TextureCoordinates(NamedTuple):
+    """Texture coordinates of triangles.
+
+    Attributes:
+        uvs: of corners. faces: indices of the corners. scale: texture units per meter, zero without coordinates.
+    """
+
+    uvs: Shaped[F32, "corners 2"]
+    faces: Shaped[NDArray[np.uint32], "faces 3"]
+    scale: Shaped[F32, " faces"]
+
+
+def texture_coordinates(
+    uvs: Shaped[F32, "corners 2"], positions: Shaped[F32, "corners 3"], faces: Shaped[NDArray[np.uint32], "faces 3"]
+) -> TextureCoordinates:
+    """Return the texture coordinates of triangles.
+
+    Args:
+        uvs, positions: of the corners. faces: indices of the triangles' corners.
+    """
+    a, b, c = positions[faces].transpose(1, 0, 2)
+    twice_area = np.maximum(np.linalg.norm(np.cross(b - a, c - a), axis=1), 1e-20)
+    (du_0, dv_0), (du_1, dv_1) = (uvs[faces][:, k].T - uvs[faces][:, 0].T for k in (1, 2))
+    scale = np.sqrt(np.abs(du_0 * dv_1 - dv_0 * du_1) / twice_area)
+    return TextureCoordinates(uvs, faces, scale.astype(np.float32))
+
+
+def project_missing(
+    coordinates: TextureCoordinates,
+    positions: Shaped[F32, "corners 3"],
+    corners: Shaped[NDArray[np.uint32], "faces 3"],
+    face_normal: Shaped[F32, "faces 3"],
+    is_needed: Shaped[NDArray[np.bool_], " faces"],
+) -> TextureCoordinates:
+    """Compute missing texture coordinates by tri-planar projection, one texture unit per meter.
+
+    Args:
+        coordinates: as baked. positions: of the corners. corners: of the triangles. face_normal: unit.
+        is_needed: True for triangles that have a texture.
+    """
+    flat = np.flatnonzero((coordinates.scale == 0) & is_needed)
+    if not len(flat):
+        return coordinates
+    across, up = triplanar_axes(face_normal[flat])
+    points = positions[corners[flat]]
+    u, v = np.einsum("fkc,fc->fk", points, across), -np.einsum("fkc,fc->fk", points, up)
+    uvs = np.concatenate([coordinates.uvs, np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)])
+    faces, scale = coordinates.faces.copy(), coordinates.scale.copy()
+    faces[flat] = len(coordinates.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
+    scale[flat] = 1
+    return TextureCoordinates(uvs, faces, scale)
