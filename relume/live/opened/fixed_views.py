@@ -256,7 +256,7 @@ class BakedFixedViews:
         pattern = self._lobe_tracer.pattern(lobe)
         reflectances = light.reflectances if light.paths.has_all_bounces else ()
         narrow = tuple(reflectance.digest if reflects_narrowly(reflectance) else "" for reflectance in reflectances)
-        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow if any(narrow) else ()))
+        key = digest((pattern.num_rays, lobe.angles, lobe.axes, lobe.quantile.tobytes(), narrow if any(narrow) else ()))
         tint, share = self._lobe_patches(reflectances)
         footprint = samples.pixel_footprint(receivers)
         surfaces = self._lobe_tracer.surfaces(reflectances if any(narrow) else (), tint)

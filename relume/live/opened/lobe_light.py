@@ -147,7 +147,8 @@ def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "step
 def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
     """Return the lobe of a material whose highlights are narrow and strong, and their terms; None for others."""
     lobes = (sample_lobe(document, NO_LEVELS) for document in reflectance.lobes)
-    narrow = next((lobe for lobe in lobes if lobe is not None), None)
+    # tangents are unknown at hits
+    narrow = next((lobe for lobe in lobes if lobe is not None and lobe.is_round), None)
     return None if narrow is None else (narrow, reflectance.lobes)
 
 
