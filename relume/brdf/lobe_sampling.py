@@ -26,7 +26,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from relume.brdf.curves import curve_values
 from relume.brdf.registry import TERMS
-from relume.brdf.roughness_levels import RoughnessLevels, scaled_roughness
+from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.term import Angle, Curve
 from relume.math.angle_bands import MAX_ANGLE, band_edges
 
@@ -94,7 +94,7 @@ def sample_lobe(document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSam
     if not curves or not any(curves[0].axes):
         return None
     rows = []
-    for level in [scaled_roughness(document, ratio) for ratio in levels.ratios] or [dict(document)]:
+    for level in levels.documents(document) or [dict(document)]:
         for curve in curves:
             row = _sample_curve(level, curve)
             if row is None:

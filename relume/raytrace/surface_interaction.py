@@ -19,7 +19,6 @@ from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import project_to_tangent
 from relume.raytrace.texture import MipMap
 from relume.scene.model import Material
-from relume.scene.roughness_levels import base_roughness, rougher
 
 F32 = NDArray[np.float32]
 
@@ -139,10 +138,6 @@ class _Textured(NamedTuple):
                     face_points.uv[rows],
                     _footprint_sides(face_points, rows, footprint[rows], directions[rows]),
                 )
-                if (material_roughness := base_roughness(scene_material)) is not None:
-                    channels["roughness"][rows, 0] = rougher(
-                        channels["roughness"][rows, 0], length[rows], material_roughness
-                    )
                 normal = normal.copy() if normal is face_points.normal else normal
                 normal[rows] = mapped_normal(
                     mapped, normal[rows], face_points.tangents[rows], face_points.face_normal[rows]

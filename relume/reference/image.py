@@ -255,7 +255,7 @@ def _add_indirect(
 
 
 def points_of_samples(
-    samples: ViewSamples, textures: Mapping[str, F32], roughness: Shaped[F32, " n"]
+    samples: ViewSamples, textures: Mapping[str, F32], roughness: Shaped[F32, "n 2"]
 ) -> ReferencePoints:
     """Convert view samples to points; points of background samples are meaningless.
 

@@ -49,7 +49,7 @@ class ReferencePoints:
     Attributes:
         position: positions, offset from the surface. normal, tangent: shading frame. wo: toward the viewer.
         textures: factors of terms by channel, "diffuse" and "specular". (n, 3) float32 each
-        roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`.
+        roughness: see `relume.reference.textures.surface_roughness`.
         uv: see `SurfaceInteraction`; None to use the mean of BTFs.
         alpha_sample: alpha sample for shadow rays at blended surfaces; see
             `relume.raytrace.surface_points.SurfacePoints`.
@@ -60,7 +60,7 @@ class ReferencePoints:
     tangent: Shaped[F32, "n 3"]
     wo: Shaped[F32, "n 3"]
     textures: Mapping[str, F32]
-    roughness: Shaped[F32, " n"]
+    roughness: Shaped[F32, "n 2"]
     uv: Shaped[F32, "n 5"] | None = None
     alpha_sample: Shaped[F32, " #n"] = field(default_factory=lambda: FIXED_ALPHA_SAMPLE)
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import uses_roughness_map
 from relume.brdf.texture_slots import ROUGHNESS, TEXTURES, roughness_image, user_images
-from relume.images.image_store import load_normal_map, load_roughness_map, load_texture, mean_roughness
+from relume.images.image_store import load_normal_map, load_roughness_map, load_texture
 from relume.look import Look
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Material, Mesh, Scene
-from relume.scene.roughness_levels import rougher
+from relume.scene.roughness_levels import slope_variance
 from relume.scene_io.gltf.uvs import compute_tangents
 
 F32 = NDArray[np.float32]
@@ -100,8 +100,8 @@ def surface_textures(
 
 def surface_roughness(
     scene: Scene, look: Look, surface: SurfaceInteraction, material: Shaped[NDArray[np.integer], " n"]
-) -> Shaped[F32, " n"]:
-    """Roughness at surface points, relative to the material's terms.
+) -> Shaped[F32, "n 2"]:
+    """Roughness at surface points, relative to the material's terms, and slope variance of normals within the pixel.
 
     Args:
         scene, look, surface, material: as in `surface_textures`.
@@ -113,6 +113,4 @@ def surface_roughness(
             rows = np.flatnonzero(material == index)
             roughness = roughness.copy()
             roughness[rows] = sample_image(load_roughness_map(name), surface.uv[rows])[:, 0]
-            if scene_material.normal_map is not None and (mean := mean_roughness(name)):
-                roughness[rows] = rougher(roughness[rows], surface.normal_length[rows], mean)
-    return roughness
+    return np.column_stack([roughness, slope_variance(surface.normal_length)])

@@ -68,7 +68,7 @@ def test_densities_of_all_bands_sum_to_one():
 
 def test_each_roughness_level_has_its_own_lobe():
     mapped = {**document("ggx", roughness=0.1), "roughness_map": True}
-    lobe = sample_lobe(mapped, RoughnessLevels((0.5, 2.0, 4.0), np.zeros(1, np.uint8)))
+    lobe = sample_lobe(mapped, RoughnessLevels(((0.5, 0.0), (2.0, 0.0), (4.0, 0.0)), np.zeros(1, np.uint8)))
     assert lobe.is_narrow.tolist() == [True, True, False]
     ratio = lobe.quantile[1, 2048] / lobe.quantile[0, 2048]
     assert ratio == pytest.approx(16, rel=0.02)
