@@ -153,10 +153,15 @@ def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | N
 
 
 def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
-    """Remove the gather rays of points whose light is traced along their lobe. rays: of `receivers`"""
-    is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
-    gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
-    return replace(rays, gather_hits=gather_hits)
+    """Remove the gather rays of points whose light is traced along their lobe; neighbors do not share with them.
+
+    Args:
+        rays: of `receivers`, which have roughness levels. lobe: of the term.
+    """
+    is_broad = ~lobe.is_narrow[receivers.level]
+    gather_hits = np.where(is_broad[:, None], rays.gather_hits, np.uint16(NO_PATCH))
+    sharing = rays.sharing and rays.sharing._replace(highlights=rays.sharing.highlights.within(is_broad))
+    return replace(rays, gather_hits=gather_hits, sharing=sharing)
 
 
 def reflects_narrowly(reflectance: Reflectance) -> bool:
