@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from relume.brdf.curve_edits import curve_edit, drawn_curves, evaluate_edit, is_relative
 from relume.brdf.registry import TERMS
-from relume.brdf.term import F64, Angle, Curve, Params
+from relume.brdf.term import F64, Curve, Params
 from relume.math.angle_bands import MAX_ANGLE, band_averages, band_edges
 
 CHANNELS = "rgb"
@@ -30,7 +30,7 @@ def channel_params(term_document: Mapping[str, Any], curve: Curve) -> list[dict[
     term = TERMS[term_document["model"]]
     given = term_document.get("params") or {}
     values = {name: given.get(name, term.parameter(name).default) for name in curve.parameters}
-    if SLOPE_VARIANCE in term_document and curve.angle is Angle.THETA_H:
+    if SLOPE_VARIANCE in term_document and term.width is not None and term.width[0] in curve.parameters:
         values[SLOPE_VARIANCE] = term_document[SLOPE_VARIANCE]
     return [
         {name: float(value if isinstance(value, int | float) else value[k]) for name, value in values.items()}

@@ -120,7 +120,7 @@ class Term:
         data: store of the measured data that documents must name, if any; the name is fixed too.
         texels: for a BTF, the BRDFs per texel, whose mean is the quotient; from `normalize`.
         width: the parameter that roughness maps scale, and its exponent in terms of roughness.
-        convolves_slopes: the half-angle curve reads the slope variance of normals, `relume.brdf.curves.SLOPE_VARIANCE`.
+        convolves_slopes: curves of the width read the slope variance of normals, `relume.brdf.curves.SLOPE_VARIANCE`.
     """
 
     model: str

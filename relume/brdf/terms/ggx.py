@@ -66,8 +66,11 @@ def _convolved(alpha2: float, added: float, sin2: F64, cos2: F64) -> F64:
 
 
 def masking(theta: F64, params: Params) -> F64:
-    """G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; written without the tangent, which has a pole."""
-    alpha2 = roughness_to_alpha(params["roughness"]) ** 2
+    """G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; written without the tangent, which has a pole.
+
+    Normals that vary mask one another like facets: α² + 2 σ² with their "slope_variance" σ².
+    """
+    alpha2 = roughness_to_alpha(params["roughness"]) ** 2 + 2 * params.get("slope_variance", 0.0)
     cos = np.cos(theta)
     return np.asarray(2.0 * cos / (cos + np.sqrt(cos * cos + alpha2 * np.sin(theta) ** 2)))
 
