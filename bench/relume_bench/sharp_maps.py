@@ -33,7 +33,7 @@ from relume_bench.mitsuba import averaged, bsdf, cached_passes, missing
 
 F32 = NDArray[np.float32]
 
-_MASKS = {
+_MASKS: dict[str, dict[str, tuple[str, ...]]] = {
     "bumps": {"normal_map": ("Bumpy ball", "Bumpy panel")},
     "balls": {"roughness_map": ("Spotted ball",), "anisotropic": ("Brushed ball",)},
 }
@@ -74,7 +74,7 @@ def _compare_peaks(image: F32, passes: F32, mask: NDArray[np.bool_], context: di
     """Ratio of the percentiles of luminance, ours ÷ Mitsuba's; see the module."""
     inside = averaged(np.repeat(mask[..., None], 3, axis=2), sharp.FINER)[..., 0] > 0.5
     ours, mitsuba = (
-        np.percentile(luminance(averaged(picture, sharp.FINER))[inside], _PEAK)
+        np.percentile(luminance(np.asarray(averaged(picture, sharp.FINER), np.float32))[inside], _PEAK)
         for picture in (image, passes.mean(axis=0))
     )
     return Figure("sharp.peak_normal_map", float(ours / mitsuba), "ratio", {"mitsuba": float(mitsuba), **context})
