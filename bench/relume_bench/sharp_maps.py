@@ -1,7 +1,7 @@
 """sharp.rmse_normal_map, sharp.peak_normal_map; sharp.rmse_roughness_map, sharp.rmse_anisotropic: polished maps.
 
-Polished shapes on a gray floor under a sky with a large soft sun, in two scenes, because no ball should mirror the
-glitter of bumps: a ball and a tilted panel with a normal map of bumps from three texels to 24, whose finest are smaller
+Polished shapes on a gray floor under an environment with a large soft sun, in two scenes, because no ball should mirror
+the glitter of bumps: a ball and a tilted panel with a normal map of bumps from three texels to 24, whose finest are smaller
 than a pixel; and a ball whose roughness map has spots from 0.03 to 0.6 beside a brushed one, anisotropic Ward. Method
 `gather`, all light, exact image of 640×480 against Mitsuba with the same maps, averaged over 2 × 2 pixels, its noise
 removed; errors over the pixels of each shape. Peak: the 99.9th percentile of luminance over the normal-mapped pixels,
@@ -88,8 +88,8 @@ def make_map_scene(kind: str) -> Scene:
     surfaces += [surface for _, surface in shapes]
     meshes = [surface.mesh(materials[k].name, k) for k, surface in enumerate(surfaces)]
     camera = look_at(sharp.VIEW, (0.0, 0.95, 3.3), (0.0, 0.42, 0.0), float(np.radians(34.0)))
-    sky = sunny_environment(np.array([-0.35, 0.75, 0.6]), radius=float(np.radians(5.0)))
-    return make_scene(f"polished {kind}", meshes, materials, [camera], sky)
+    environment = sunny_environment(np.array([-0.35, 0.75, 0.6]), radius=float(np.radians(5.0)))
+    return make_scene(f"polished {kind}", meshes, materials, [camera], environment)
 
 
 def _bumps() -> list[tuple[Material, GridSurface]]:
@@ -147,7 +147,7 @@ def make_spots() -> Shaped[F32, "rows columns"]:
 
 
 def render_mitsuba(scene: Scene, size: tuple[int, int], spp: int) -> Shaped[F32, "passes height width 3"]:
-    """Mitsuba's images of a scene with the same maps."""
+    """Mitsuba's images of a scene with the same maps. size: in pixels. spp: paths a pixel and pass"""
     images = {"bumps": 0.5 + 0.5 * make_bumps(), "alpha": np.square(make_spots())[..., None]}
     job = sharp.make_job([_describe(material) for material in scene.materials])
     return cached_passes(scene, size, {**job, "spp": [spp]}, images)

@@ -62,12 +62,12 @@ class LobeSampling(NamedTuple):
 
     @property
     def is_half_angle(self) -> bool:
-        """Whether rays are drawn by their half vectors."""
+        """True if rays are drawn by their half vectors."""
         return self.angles != (Angle.THETA_R,)
 
     @property
     def is_round(self) -> bool:
-        """Whether the lobe is equal at all azimuths about the normal or the mirror direction."""
+        """True if the lobe is equal at all azimuths about the normal or the mirror direction."""
         return len(self.angles) == 1 and self.axes == (1.0, 1.0, 1.0)
 
     @property

@@ -134,7 +134,10 @@ def _angle_in_band(pattern, row, u):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def mirrored_axis(pattern, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """The direction, unit, that mirrors to the axis of a θr lobe; wo itself for all but Lafortune's. ox, oy, oz: wo"""
+    """The direction, unit, that mirrors to the axis of a θr lobe; wo itself for all but Lafortune's.
+
+    pattern: a `LobePattern`. ox, oy, oz: local wo.
+    """
     x, y, z = pattern.axes[0] * ox, pattern.axes[1] * oy, pattern.axes[2] * oz
     scale = _ONE / max(np.float32(math.sqrt(x * x + y * y + z * z)), _MIN_COSINE)
     return x * scale, y * scale, z * scale

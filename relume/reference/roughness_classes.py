@@ -15,6 +15,7 @@ from relume.brdf.specular import is_mirror, specular_albedo
 from relume.brdf.texture_slots import roughness_image
 from relume.images.image_store import load_roughness_map, mean_roughness
 from relume.look import Look
+from relume.reference.radiance import ReferencePoints
 from relume.scene.model import Material, Scene
 from relume.scene.roughness_levels import (
     ONE_LEVEL,
@@ -50,18 +51,15 @@ class RoughnessClasses:
     grids: list[LevelGrid]
 
     def classify(
-        self, material: Shaped[NDArray[np.integer], " n"], roughness: Shaped[F32, "n 2"]
+        self, material: Shaped[NDArray[np.integer], " n"], points: ReferencePoints
     ) -> Shaped[NDArray[np.int64], " n"]:
-        """Return the classes of points.
-
-        Args:
-            material: index into the scene's materials. roughness: see `relume.reference.textures.surface_roughness`.
-        """
+        """Return the classes of points. material: indices into the scene's materials"""
+        variance = np.broadcast_to(points.slope_variance, len(material))
         class_index: NDArray[np.int64] = np.array(self.first, np.int64)[material]
         for index, grid in enumerate(self.grids):
             if grid.pairs:
                 rows = np.flatnonzero(material == index)
-                class_index[rows] += grid.select(roughness[rows, 0], roughness[rows, 1])
+                class_index[rows] += grid.select(points.roughness[rows], variance[rows])
         return class_index
 
 

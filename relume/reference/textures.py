@@ -16,7 +16,6 @@ from relume.look import Look
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Material, Mesh, Scene
-from relume.scene.roughness_levels import slope_variance
 from relume.scene_io.gltf.uvs import compute_tangents
 
 F32 = NDArray[np.float32]
@@ -100,8 +99,8 @@ def surface_textures(
 
 def surface_roughness(
     scene: Scene, look: Look, surface: SurfaceInteraction, material: Shaped[NDArray[np.integer], " n"]
-) -> Shaped[F32, "n 2"]:
-    """Roughness at surface points, relative to the material's terms, and slope variance of normals within the pixel.
+) -> Shaped[F32, " n"]:
+    """Roughness at surface points, relative to the material's terms.
 
     Args:
         scene, look, surface, material: as in `surface_textures`.
@@ -113,4 +112,4 @@ def surface_roughness(
             rows = np.flatnonzero(material == index)
             roughness = roughness.copy()
             roughness[rows] = sample_image(load_roughness_map(name), surface.uv[rows])[:, 0]
-    return np.column_stack([roughness, slope_variance(surface.normal_length)])
+    return roughness

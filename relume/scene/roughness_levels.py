@@ -103,7 +103,11 @@ def levels_in_range(lowest: float, highest: float, base: float | None, min_lengt
 
 
 def level_range(grid: LevelGrid, num_ratios: int, num_variances: int) -> LevelGrid:
-    """Return other numbers of levels over the range of a grid; one stays one."""
+    """Return other numbers of levels over the range of a grid; one stays one.
+
+    Args:
+        grid: any. num_ratios, num_variances: the numbers.
+    """
     ratios, variances = (np.sqrt(np.array(axis)) for axis in grid)
     numbers = (num if len(axis) > 1 else 1 for axis, num in zip(grid, (num_ratios, num_variances), strict=True))
     axes = (np.linspace(axis[0], axis[-1], num) for axis, num in zip((ratios, variances), numbers, strict=True))
