@@ -1,11 +1,11 @@
 """sharp.rmse_normal_map, sharp.peak_normal_map; sharp.rmse_roughness_map, sharp.rmse_anisotropic: polished maps.
 
 Polished shapes on a gray floor under an environment with a large soft sun, in two scenes, because no ball should mirror
-the glitter of bumps: a ball and a tilted panel with a normal map of bumps from three texels to 24, whose finest are smaller
-than a pixel; and a ball whose roughness map has spots from 0.03 to 0.6 beside a brushed one, anisotropic Ward. Method
-`gather`, all light, exact image of 640×480 against Mitsuba with the same maps, averaged over 2 × 2 pixels, its noise
-removed; errors over the pixels of each shape. Peak: the 99.9th percentile of luminance over the normal-mapped pixels,
-ours ÷ Mitsuba's.
+the glitter of bumps: a ball and a tilted panel with a normal map of bumps from three texels to 24, whose finest are
+smaller than a pixel; and a ball whose roughness map has spots from 0.03 to 0.6 beside a brushed one, anisotropic Ward.
+Method `gather`, all light, exact image of 640×480 against Mitsuba with the same maps, averaged over 2 × 2 pixels, its
+noise removed; errors over the pixels of each shape. Peak: the 99.9th percentile of luminance over the normal-mapped
+pixels, ours ÷ Mitsuba's.
 """
 
 from __future__ import annotations
