@@ -257,17 +257,18 @@ def shade_view(transfer, view: View, look):
 
 def split_by_roughness_level(view: View, index, terms):
     """Terms with their samples and lobes: one that follows a roughness map gives a term for every level."""
-    ratios, level = view.roughness_levels(index)
+    pairs, level = view.roughness_levels(index)
     assert np.all(np.diff(level.astype(int)) >= 0)  # samples of a level are contiguous
     for term in terms:
-        if not (ratios and term.get("roughness_map")):
+        if not (pairs and term.get("roughness_map")):
             yield term, slice(0, len(level)), sample_lobe(term, view.roughness_levels(index))
             continue
         assert term["model"] == "ggx"
-        for k, ratio in enumerate(ratios):
+        for k, (ratio, variance) in enumerate(pairs):
             roughness = np.clip(np.array(term["params"]["roughness"]) * ratio, 0.01, 1).tolist()
             level_rows = slice(*np.searchsorted(level, [k, k + 1]))
-            scaled = {**term, "params": {**term["params"], "roughness": roughness}}
+            widened = {"slope_variance": variance} if variance > 0 else {}
+            scaled = {**term, "params": {**term["params"], "roughness": roughness}, **widened}
             yield scaled, level_rows, sample_lobe(term, view.roughness_levels(index))
 
 

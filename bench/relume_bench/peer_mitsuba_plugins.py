@@ -163,6 +163,32 @@ class LambertGgx(_TwoLobes):
 mi.register_bsdf("lambert_ggx", lambda props: LambertGgx(props))
 
 
+class Ward(_TwoLobes):
+    """gain exp(−tan² θh (cos² φh / αx² + sin² φh / αy²)) / (4π αx αy √(cos θi cos θo)), Ward 1992; samples facets."""
+
+    def __init__(self, props: Any) -> None:
+        props["albedo"] = mi.ScalarColor3f(0)
+        super().__init__(props)
+        alphas = float(props["alpha_x"]), float(props["alpha_y"])
+        self.facets = mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, *alphas, sample_visible=False)
+
+    def _glossy(self, wi: Any, wo: Any) -> Any:
+        h = dr.normalize(wi + wo)
+        cosines = dr.maximum(mi.Frame3f.cos_theta(wi) * mi.Frame3f.cos_theta(wo), 1e-12)
+        slopes = self.facets.eval(h) * mi.Frame3f.cos_theta(h) ** 4
+        return slopes * mi.Frame3f.cos_theta(wo) / (4 * dr.sqrt(cosines))
+
+    def _density(self, wi: Any, wo: Any) -> Any:
+        h = dr.normalize(wi + wo)
+        return self.facets.pdf(wi, h) / (4 * dr.maximum(dr.dot(wo, h), 1e-6))
+
+    def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
+        return mi.reflect(wi, self.facets.sample(wi, direction_sample)[0])
+
+
+mi.register_bsdf("ward", lambda props: Ward(props))
+
+
 class _MirrorOverDiffuse(_Sided):
     """A smooth mirror mixed with albedo/π, by `diffuse_probability`.
 

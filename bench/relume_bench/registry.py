@@ -221,6 +221,8 @@ GROUPS = (
     *(Group("relume_bench.sharp", (f"sharp.rmse_plastic_{r}",), arguments=("plastic", r)) for r in (0.05, 0.1)),
     Group("relume_bench.sharp_room", ("sharp.rmse_room",)),
     Group("relume_bench.sharp_checker", ("sharp.rmse_checker",)),
+    Group("relume_bench.sharp_maps", ("sharp.rmse_normal_map", "sharp.peak_normal_map"), arguments=("bumps",)),
+    Group("relume_bench.sharp_maps", ("sharp.rmse_roughness_map", "sharp.rmse_anisotropic"), arguments=("balls",)),
     Group(
         "relume_bench.sharp_free_camera",
         tuple(f"sharp.{kind}_rmse_{r}" for r in (0.02, 0.05, 0.1, 0.2, 0.3) for kind in ("static", "moving")),

@@ -21,13 +21,17 @@ from relume.brdf.term import F64, Curve, Params
 from relume.math.angle_bands import MAX_ANGLE, band_averages, band_edges
 
 CHANNELS = "rgb"
+SLOPE_VARIANCE = "slope_variance"
+"""Entry of a term document at a roughness level: variance of normals within a pixel; never in looks."""
 
 
 def channel_params(term_document: Mapping[str, Any], curve: Curve) -> list[dict[str, float]]:
-    """Parameters that `curve` reads, for R, G and B; missing parameters have their defaults."""
+    """Parameters that `curve` reads, for R, G and B; missing parameters have their defaults. See `SLOPE_VARIANCE`."""
     term = TERMS[term_document["model"]]
     given = term_document.get("params") or {}
     values = {name: given.get(name, term.parameter(name).default) for name in curve.parameters}
+    if SLOPE_VARIANCE in term_document and term.width is not None and term.width[0] in curve.parameters:
+        values[SLOPE_VARIANCE] = term_document[SLOPE_VARIANCE]
     return [
         {name: float(value if isinstance(value, int | float) else value[k]) for name, value in values.items()}
         for k in range(3)

@@ -120,6 +120,7 @@ class Term:
         data: store of the measured data that documents must name, if any; the name is fixed too.
         texels: for a BTF, the BRDFs per texel, whose mean is the quotient; from `normalize`.
         width: the parameter that roughness maps scale, and its exponent in terms of roughness.
+        convolves_slopes: curves of the width read the slope variance of normals, `relume.brdf.curves.SLOPE_VARIANCE`.
     """
 
     model: str
@@ -138,6 +139,7 @@ class Term:
     data: AssetStore | None = None
     texels: Any = None
     width: tuple[str, float] | None = None
+    convolves_slopes: bool = False
 
     def __post_init__(self) -> None:
         if self.curves and not any(curve.depends_on_view for curve in self.curves):

@@ -33,7 +33,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_interaction import SurfaceInteraction, surface_at
 from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Material, Scene
-from relume.scene.roughness_levels import levels_of_material, select_level
+from relume.scene.roughness_levels import levels_of_material, slope_variance
 
 F32 = NDArray[np.float32]
 
@@ -247,13 +247,16 @@ def _sort_key(material: NDArray[np.uint16], level: NDArray[np.uint8]) -> NDArray
     return material.astype(np.int32) * _NUM_LEVELS + level
 
 
-def _roughness_levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshold: F32) -> NDArray[np.uint8]:
+def _roughness_levels(
+    scene: Scene, material: NDArray[np.uint16], surface: SurfaceInteraction, threshold: F32
+) -> NDArray[np.uint8]:
     """Roughness level of each sample, by its material. (n,)"""
-    level = np.zeros(len(material), np.uint8)
+    level, variance = np.zeros(len(material), np.uint8), slope_variance(surface.normal_length)
     for index, scene_material in enumerate(scene.materials):
-        if ratios := levels_of_material(scene_material):
-            rows = np.flatnonzero(material == index)
-            level[rows] = select_level(ratios, roughness[rows], threshold[rows])
+        rows = np.flatnonzero(material == index)
+        level[rows] = levels_of_material(scene_material).select(
+            surface.roughness[rows], variance[rows], threshold[rows]
+        )
     return level
 
 
@@ -266,7 +269,7 @@ def _sorted_samples(camera_setup: CameraSetup, rays: MergedRays) -> dict[str, ND
     order = np.lexsort((morton(rays.pixel, width), material))
     layer = rays.layer.rows(order)
     surface = surface_at(geometry, layer.hits, layer.directions, scene.materials, camera_setup.pixel_angle)
-    level = _roughness_levels(scene, material[order], surface.roughness, dither_thresholds(rays.pixel[order], width))
+    level = _roughness_levels(scene, material[order], surface, dither_thresholds(rays.pixel[order], width))
     if level.any():
         by_level = np.lexsort((level, material[order]))
         order, surface, layer, level = order[by_level], surface.rows(by_level), layer.rows(by_level), level[by_level]

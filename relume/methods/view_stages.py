@@ -150,7 +150,7 @@ class SampledViews:
             "frost": glass_surfaces(scene.materials).alpha.tolist(),
             "has_tints": num_tints(scene.materials) > 0,
             "has_emission_images": has_emission_images(scene),
-            "roughness_levels": [list(levels_of_material(material)) for material in scene.materials],
+            "roughness_levels": [list(map(list, levels_of_material(material).pairs)) for material in scene.materials],
             "shortest_normals": [min_mean_normal_length(material.normal_map) for material in scene.materials],
             "views": [_view_attributes(cameras[view]) for view in recipe.views],
         }

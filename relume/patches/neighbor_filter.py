@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -40,6 +41,14 @@ class FilterWeights(NamedTuple):
             )
             is_neighbor[neighbors], needed = False, neighbors
         return matrices, needed
+
+    def within(self, is_member: Shaped[NDArray[np.bool_], " n"]) -> FilterWeights:
+        """Return the filter among some points alone; the values of all others become zero."""
+        matrix, member = self.matrix, is_member.astype(np.float32)
+        kept = csr_array((matrix.data * member[matrix.indices], matrix.indices, matrix.indptr), shape=matrix.shape)
+        scale = member / np.maximum(kept @ np.ones_like(member), np.float32(1e-6))
+        data = kept.data * np.repeat(scale, np.diff(matrix.indptr))
+        return FilterWeights(csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape), self.num_passes)
 
 
 class NeighborFilter(NamedTuple):

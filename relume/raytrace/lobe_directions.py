@@ -1,6 +1,7 @@
 """Directions of lobe rays, drawn from the lobe of a term; recomputed wherever they are needed, never stored.
 
-Rays are a Fibonacci lattice on the unit square (u, v): u is the quantile of the angle, v the azimuth. Points share the
+Rays are a Fibonacci lattice on the unit square (u, v): u is the quantile of the angle, v the azimuth; or, for an
+anisotropic lobe, they are the quantiles of two angles, with a sign. Points share the
 lattice, each shifted within a cell by its seed, as gather rays (`relume.raytrace.gather_rays`).
 """
 
@@ -14,6 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.angles import TILT_X
 from relume.brdf.lobe_sampling import LobeSampling
 from relume.raytrace.gather_rays import cranley_patterson_offset, fibonacci_lattice, shortest_lattice_vectors
 
@@ -23,6 +25,7 @@ _PI = np.float32(math.pi)
 _ZERO, _HALF, _ONE, _TWO, _FOUR = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2), np.float32(4)
 _MARGIN = np.float32(0.01)  # of a band, which rounding must not make a ray cross
 _MIN_COSINE = np.float32(1e-4)
+_TINY, _LARGEST_SQUARE = np.float32(1e-12), np.float32(1 - 1e-6)
 # Roberts' R2 sequence, as fractions of 2^32
 _STEP_U, _STEP_V = (np.uint32(round(2**32 / 1.32471795724474602596**k)) for k in (1, 2))
 _PER_UNIT = np.float32(1 / (1 << 24))
@@ -35,15 +38,18 @@ class LobePattern(NamedTuple):
         uv: points on the unit square.
         sides: two edge vectors of a lattice cell.
         seed: seed of the shifts.
-        quantile, band_density, is_half_angle, is_narrow: as in `LobeSampling`; points of other levels have no rays.
+        angles, axes, quantile, band_density, is_half_angle, is_narrow: as in `LobeSampling`; points of other levels
+            have no rays.
         scale: bands per radian.
     """
 
     uv: Shaped[F32, "N 2"]
     sides: Shaped[F32, "2 2"]
     seed: int
-    quantile: Shaped[F32, "L quantiles"]
-    band_density: Shaped[F32, "L J"]
+    angles: Shaped[NDArray[np.int64], " angles"]
+    axes: Shaped[F32, " 3"]
+    quantile: Shaped[F32, "rows quantiles"]
+    band_density: Shaped[F32, "rows J"]
     is_half_angle: bool
     is_narrow: Shaped[NDArray[np.bool_], " L"]
     scale: float
@@ -64,6 +70,8 @@ def make_lobe_pattern(sampling: LobeSampling, num_rays: int, seed: int) -> LobeP
         fibonacci_lattice(num_rays).astype(np.float32),
         shortest_lattice_vectors(num_rays).astype(np.float32),
         seed & 0x7FFFFFFF,
+        np.array(sampling.angles, np.int64),
+        np.array(sampling.axes, np.float32),
         sampling.quantile,
         sampling.band_density,
         sampling.is_half_angle,
@@ -92,15 +100,79 @@ def lobe_ray(pattern, level, ray, shift, ox, oy, oz):  # type: ignore[no-untyped
         pattern: a `LobePattern`. level: roughness level of the point. ray: index of the ray.
         shift: from `lobe_shift`. ox, oy, oz: local wo, toward the viewer.
     Returns:
-        Local wi, not above the horizon for rays that must not be traced; band of the ray's angle.
+        Local wi, not above the horizon for rays that must not be traced; band of the ray's angle, or of two angles
+        as j₀ J + j₁, negative for such rays.
     """
-    u, v = pattern.uv[ray, 0] + shift[0], pattern.uv[ray, 1] + shift[1]
-    u = u - _ONE if u >= _ONE else (u + _ONE if u < _ZERO else u)
-    scaled = pattern.scale * angle_at_quantile(pattern.quantile, level, u)
+    u, v = _wrapped(pattern.uv[ray, 0] + shift[0]), _wrapped(pattern.uv[ray, 1] + shift[1])
+    if pattern.angles.shape[0] == 1:
+        angle, band = _angle_in_band(pattern, level, u)
+        px, py, pz = mirrored_axis(pattern, ox, oy, oz)
+        wi, is_valid = lobe_direction(pattern.is_half_angle, angle, v, px, py, pz)
+    else:
+        along, first_band = _angle_in_band(pattern, 2 * level, abs(_TWO * u - _ONE))
+        across, second_band = _angle_in_band(pattern, 2 * level + 1, abs(_TWO * v - _ONE))
+        hx, hy, hz = _half_vector(pattern.angles[0], along, across)
+        wi, is_valid = _reflected(hx if u >= _HALF else -hx, hy if v >= _HALF else -hy, hz, ox, oy, oz)
+        band = first_band * pattern.band_density.shape[1] + second_band
+    return wi, band if is_valid else -1
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _wrapped(u):  # type: ignore[no-untyped-def]
+    """u in [−1, 2) modulo 1."""
+    return u - _ONE if u >= _ONE else (u + _ONE if u < _ZERO else u)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _angle_in_band(pattern, row, u):  # type: ignore[no-untyped-def]
+    """Angle at a quantile, off the edges of its band, and the band. row: in `LobePattern.quantile`"""
+    scaled = pattern.scale * angle_at_quantile(pattern.quantile, row, u)
     band = min(int(scaled), pattern.band_density.shape[1] - 1)
     within = min(max(scaled - np.float32(band), _ZERO if band == 0 else _MARGIN), _ONE - _MARGIN)
-    wi, is_valid = lobe_direction(pattern.is_half_angle, (np.float32(band) + within) / pattern.scale, v, ox, oy, oz)
-    return wi, band if is_valid else -1
+    return (np.float32(band) + within) / pattern.scale, band
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def mirrored_axis(pattern, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """The direction, unit, that mirrors to the axis of a θr lobe; wo itself for all but Lafortune's.
+
+    pattern: a `LobePattern`. ox, oy, oz: local wo.
+    """
+    x, y, z = pattern.axes[0] * ox, pattern.axes[1] * oy, pattern.axes[2] * oz
+    scale = _ONE / max(np.float32(math.sqrt(x * x + y * y + z * z)), _MIN_COSINE)
+    return x * scale, y * scale, z * scale
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _half_vector(angle, along, across):  # type: ignore[no-untyped-def]
+    """Half vector, unit, at two angles. angle: the first one's `Angle`. along, across: radians, not negative"""
+    if angle == TILT_X:
+        x, y = np.float32(math.tan(along)), np.float32(math.tan(across))
+        scale = _ONE / np.float32(math.sqrt(_ONE + x * x + y * y))
+        return x * scale, y * scale, scale
+    a, b = np.float32(math.sin(along)), np.float32(math.sin(across))
+    x, y = _log_cosine(a), _log_cosine(b)
+    sine = np.float32(math.sqrt(a * a + b * b - a * a * b * b))
+    scale = sine / max(np.float32(math.sqrt(x * x + y * y)), _TINY)
+    return x * scale, y * scale, np.float32(math.cos(along)) * np.float32(math.cos(across))
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _log_cosine(sine):  # type: ignore[no-untyped-def]
+    """√(−2 ln cos γ), which is r cos φh for γα and r sin φh for γβ, r = √(−2 ln cos θh). sine: sin γ"""
+    return np.float32(math.sqrt(-np.float32(math.log1p(-min(sine * sine, _LARGEST_SQUARE)))))
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _solid_angle_of(angle, along, across):  # type: ignore[no-untyped-def]
+    """Solid angle dωh / (dγ₀ dγ₁) of half vectors. angle, along, across: as for `_half_vector`, not zero"""
+    a, b = np.float32(math.sin(along)), np.float32(math.sin(across))
+    if angle == TILT_X:
+        # cos³ θh / (cos² γ₀ cos² γ₁)
+        p, q = np.float32(math.cos(along)), np.float32(math.cos(across))
+        p, q = p * p, q * q
+        return np.float32(math.sqrt(p * q)) / np.float32(math.sqrt(_ONE - a * a * b * b)) ** 3
+    return a * b / (_log_cosine(a) * _log_cosine(b))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -111,6 +183,13 @@ def angle_at_quantile(quantile, row, u):  # type: ignore[no-untyped-def]
     cell = min(int(position), num_cells - 1)
     low, high = quantile[row, cell], quantile[row, cell + 1]
     return low + (position - np.float32(cell)) * (high - low)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _reflected(x, y, z, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Direction wi of a half vector, and whether the viewer sees it. x, y, z: h. ox, oy, oz: wo"""
+    twice_cosine = _TWO * (ox * x + oy * y + oz * z)
+    return (twice_cosine * x - ox, twice_cosine * y - oy, twice_cosine * z - oz), twice_cosine > _ZERO
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -127,8 +206,7 @@ def lobe_direction(is_half_angle, angle, v, ox, oy, oz):  # type: ignore[no-unty
     sine, z = np.float32(math.sin(angle)), np.float32(math.cos(angle))
     x, y = sine * np.float32(math.cos(azimuth)), sine * np.float32(math.sin(azimuth))
     if is_half_angle:
-        twice_cosine = _TWO * (ox * x + oy * y + oz * z)
-        return (twice_cosine * x - ox, twice_cosine * y - oy, twice_cosine * z - oz), twice_cosine > _ZERO
+        return _reflected(x, y, z, ox, oy, oz)
     # about the mirror direction (−ox, −oy, oz): the frame that rotates n to it along the shortest arc
     inverse = _ONE / max(_ONE + oz, _MIN_COSINE)
     along = x * ox + y * oy
@@ -153,7 +231,14 @@ def lobe_density(pattern, level, band, cos_theta_d):  # type: ignore[no-untyped-
     """Mean density of all N rays of a point in a band, per steradian of wi.
 
     Args:
-        pattern: a `LobePattern`. level: roughness level. band: of the angle. cos_theta_d: cosine wi · h.
+        pattern: a `LobePattern`. level: roughness level. band: from `lobe_ray`. cos_theta_d: cosine wi · h.
     """
-    density = np.float32(pattern.uv.shape[0]) * pattern.band_density[level, band]
+    num_rays, num_bands = np.float32(pattern.uv.shape[0]), pattern.band_density.shape[1]
+    if pattern.angles.shape[0] == 1:
+        density = num_rays * pattern.band_density[level, band]
+    else:
+        first, second = band // num_bands, band % num_bands
+        along, across = (np.float32(first) + _HALF) / pattern.scale, (np.float32(second) + _HALF) / pattern.scale
+        product = pattern.band_density[2 * level, first] * pattern.band_density[2 * level + 1, second]
+        density = num_rays * product / _solid_angle_of(pattern.angles[0], along, across)
     return density / (_FOUR * max(cos_theta_d, _MIN_COSINE)) if pattern.is_half_angle else density

@@ -7,9 +7,14 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.raytrace.tangents import project_to_tangent, unit
+from relume.raytrace.texture import MipMap
+from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
 
+_LEAST_COSINE = 0.05  # between normal and view direction, as for `FacePoints.footprint`
+_SIDE_SAMPLES = 4  # of normal maps, along each side of a pixel
+_UP = np.array([[0, 0, 1]], np.float32)
 MIN_FACING = 0.01  # minimum cosine between a shading normal and the direction to the viewer
 
 
@@ -22,6 +27,49 @@ def visible_length(mapped: Shaped[F32, "n 3"], texels: Shaped[F32, " n"]) -> Sha
     """
     coverage = np.clip(np.log2(np.maximum(texels, 1)), 0, 1)
     return np.asarray(1 - coverage * (1 - np.minimum(np.linalg.norm(mapped, axis=1), 1)), np.float32)
+
+
+def footprint_sides(
+    uv: Shaped[F32, "n 5"], texture_axis: Shaped[F32, "n 3"], normal: Shaped[F32, "n 3"], wo: Shaped[F32, "n 3"]
+) -> Shaped[F32, "n 2 2"]:
+    """Sides of a pixel's footprint in UV space, along and across the view direction; for textures without distortion.
+
+    Args:
+        uv: see `relume.raytrace.surface_interaction.SurfaceInteraction`. texture_axis: direction of u, unit.
+        normal: of the surface, unit. wo: toward the viewer, unit.
+    """
+    across = project_to_tangent(np.cross(normal, wo), normal)
+    sides = np.stack([across, np.cross(normal, across)], axis=1)
+    down = np.cross(normal, texture_axis) * -uv[:, 4:]
+    in_texture = np.einsum("nsc,nuc->nsu", sides, np.stack([texture_axis, down], axis=1))
+    stretch = np.sqrt(np.maximum(np.einsum("nc,nc->n", normal, wo), _LEAST_COSINE))[:, None]
+    lengths = uv[:, 2:3] * np.concatenate([stretch, 1 / stretch], axis=1)
+    return np.asarray(in_texture * lengths[..., None], np.float32)
+
+
+def mean_normal(
+    texture: Texture, uv: Shaped[F32, "n 2"], sides: Shaped[F32, "n 2 2"]
+) -> tuple[Shaped[F32, "n 3"], Shaped[F32, " n"]]:
+    """Mean of a normal map over the pixels of points, and its length: one where a pixel has one normal.
+
+    A MIP map alone would average over twice the pixel, and wash highlights out.
+
+    Args:
+        texture: the normal map. uv: v from the top. sides: of each pixel's parallelogram in UV space.
+    """
+    pyramid = MipMap.for_texture(texture)
+    side = np.linalg.norm(sides, axis=2).max(axis=1).astype(np.float32)
+    is_wide = pyramid.texels(side) > 1
+    mean = np.empty((len(uv), 3), np.float32)
+    for rows, num in ((np.flatnonzero(~is_wide), 1), (np.flatnonzero(is_wide), _SIDE_SAMPLES)):
+        total, footprint = np.zeros((len(rows), 3), np.float32), side[rows] / num
+        for s, t in np.ndindex(num, num):
+            offset = ((s + 0.5) / num - 0.5) * sides[rows, 0] + ((t + 0.5) / num - 0.5) * sides[rows, 1]
+            mapped = pyramid.sample(np.asarray(uv[rows] + offset, np.float32), footprint)
+            length = visible_length(mapped, pyramid.texels(footprint))
+            total += unit(mapped, _UP) * length[:, None]
+        mean[rows] = total / num**2
+    return mean, np.minimum(np.linalg.norm(mean, axis=1), 1)
 
 
 def mapped_normal(

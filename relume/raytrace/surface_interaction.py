@@ -14,12 +14,11 @@ from relume.core.thread_pools import for_ranges
 from relume.raytrace.barycentric import FacePoints
 from relume.raytrace.camera_rays import Hits
 from relume.raytrace.scene_buffers import SceneBuffers
-from relume.raytrace.shading_normals import flip_to_viewer, mapped_normal, visible_length
+from relume.raytrace.shading_normals import flip_to_viewer, footprint_sides, mapped_normal, mean_normal
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import project_to_tangent
 from relume.raytrace.texture import MipMap
 from relume.scene.model import Material
-from relume.scene.roughness_levels import base_roughness, rougher
 
 F32 = NDArray[np.float32]
 
@@ -108,9 +107,19 @@ class _Textured(NamedTuple):
 
     @classmethod
     def sample(
-        cls, face_points: FacePoints, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32
+        cls,
+        face_points: FacePoints,
+        materials: Sequence[Material],
+        material: NDArray[np.integer],
+        footprint: F32,
+        directions: F32,
     ) -> _Textured:
-        """Look up textures. material: index, −1 for none. (n,) footprint: footprint of a pixel in UV space. (n,)"""
+        """Look up textures.
+
+        Args:
+            material: index, −1 for none. (n,) footprint: of a pixel in UV space. (n,)
+            directions: of the rays. (n, 3)
+        """
         channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
         channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
         length, normal = np.ones(len(face_points.uv), np.float32), face_points.normal
@@ -124,13 +133,11 @@ class _Textured(NamedTuple):
                         face_points.uv[rows], footprint[rows]
                     )
             if scene_material.normal_map is not None:
-                pyramid = MipMap.for_texture(scene_material.normal_map)
-                mapped = pyramid.sample(face_points.uv[rows], footprint[rows])
-                length[rows] = visible_length(mapped, pyramid.texels(footprint[rows]))
-                if (material_roughness := base_roughness(scene_material)) is not None:
-                    channels["roughness"][rows, 0] = rougher(
-                        channels["roughness"][rows, 0], length[rows], material_roughness
-                    )
+                mapped, length[rows] = mean_normal(
+                    scene_material.normal_map,
+                    face_points.uv[rows],
+                    _footprint_sides(face_points, rows, footprint[rows], directions[rows]),
+                )
                 normal = normal.copy() if normal is face_points.normal else normal
                 normal[rows] = mapped_normal(
                     mapped, normal[rows], face_points.tangents[rows], face_points.face_normal[rows]
@@ -152,7 +159,7 @@ def _interpolate_range(
         face_points.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(is_hit), np.float32)
     )
     material = np.where(is_hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
-    channels, length, mapped = _Textured.sample(face_points, materials, material, footprint)
+    channels, length, mapped = _Textured.sample(face_points, materials, material, footprint, directions)
     normal = flip_to_viewer(mapped, directions)
     tangent = project_to_tangent(face_points.tangents[:, :3], normal)
     uv_frame = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
@@ -176,6 +183,17 @@ def _interpolate_range(
         channels["emission"],
         face_points.normal.astype(np.float32, copy=False),
     )
+
+
+def _footprint_sides(face_points: FacePoints, rows: NDArray[np.intp], footprint: F32, directions: F32) -> F32:
+    """Sides of pixels in UV space at some points, see `footprint_sides`. (m, 2, 2)"""
+    normal, uv = face_points.normal[rows].astype(np.float32), face_points.uv[rows]
+    tangent = project_to_tangent(face_points.tangents[rows, :3], normal)
+    frame = _texture_frame(face_points.p[rows], face_points.uvs[rows], uv, normal, tangent)
+    frame[:, 2] = footprint
+    angle = frame[:, 3:4]
+    axis = np.asarray(np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent), np.float32)
+    return footprint_sides(frame.astype(np.float32), axis, normal, -directions)
 
 
 def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:

@@ -32,6 +32,7 @@ from relume.reference.radiance import ReferencePoints, reference_radiance
 from relume.reference.roughness_classes import roughness_classes
 from relume.reference.textures import surface_roughness, surface_textures, with_overrides
 from relume.scene.model import Scene
+from relume.scene.roughness_levels import slope_variance
 from relume.store.bake_protocol import Recipe
 from relume.views.frost_filter import make_frost_filter
 
@@ -202,7 +203,7 @@ def _prepare_view(scene: Scene, view: str, look: Look, size: tuple[int, int]) ->
 def _add_direct(radiance: F64, setup: _ViewSetup, draw: _Draw, progress: Callable[[float], object]) -> None:
     """Add direct light, and the emission of surfaces."""
     num_samples, classes = max(1, setup.on_surface.stop), roughness_classes(setup.scene, setup.look)
-    class_index = classes.classify(setup.samples.material[setup.on_surface], setup.points.roughness[setup.on_surface])
+    class_index = classes.classify(setup.samples.material[setup.on_surface], setup.points.samples_of(setup.on_surface))
     done = 0
     for index, terms in enumerate(classes.terms):
         class_rows = np.flatnonzero(class_index == index)
@@ -267,7 +268,15 @@ def points_of_samples(
     wo = (to_camera / np.linalg.norm(to_camera, axis=1, keepdims=True)).astype(np.float32)
     alpha_sample = samples.alpha_sample if samples.alpha_sample.any() else FIXED_ALPHA_SAMPLE
     return ReferencePoints(
-        points.position, points.normal, points.tangent, wo, textures, roughness, samples.surface.uv, alpha_sample
+        points.position,
+        points.normal,
+        points.tangent,
+        wo,
+        textures,
+        roughness,
+        samples.surface.uv,
+        alpha_sample,
+        slope_variance(samples.surface.normal_length),
     )
 
 

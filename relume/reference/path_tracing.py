@@ -35,6 +35,7 @@ from relume.reference.radiance import ReferencePoints, material_lobes, reference
 from relume.reference.roughness_classes import RoughnessClasses, roughness_classes
 from relume.reference.textures import surface_roughness, surface_textures
 from relume.scene.model import Scene
+from relume.scene.roughness_levels import slope_variance
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -85,7 +86,7 @@ def reference_indirect(
     classes, local_lights = roughness_classes(scene, look), emitters(scene, look)
     lobes = [material_lobes(class_terms) for class_terms in classes.terms]
     total, sum_squares = np.zeros((2, len(light_paths), points.num_points, 3))
-    first_classes = classes.classify(np.asarray(material), points.roughness)
+    first_classes = classes.classify(np.asarray(material), points)
     btf_surfaces = _sample_btf_surfaces(classes, points, first_classes, seed)
     for path in range(num_paths):
         rng = np.random.default_rng((seed, path, points.num_points))
@@ -105,7 +106,7 @@ def reference_indirect(
             )
             path_points, hit_material = _hit_points(scene, geometry, look, hits, directions, hit)
             path_points = replace(path_points, alpha_sample=alpha_sample)
-            path_classes = classes.classify(hit_material, path_points.roughness)
+            path_classes = classes.classify(hit_material, path_points)
             rows, weight = rows[hit], weight[:, hit]
             counts = np.array([_counted_states(paths, bounce + 1) for paths in light_paths])
             path_points, path_classes, rows, weight = _russian_roulette(
@@ -185,7 +186,9 @@ def _hit_points(
     material = geometry.face_material[surface_hits.face]
     textures = surface_textures(scene, look, surface, material)
     roughness = surface_roughness(scene, look, surface, material)
-    return ReferencePoints(*surface.points[:3], -directions[hit], textures, roughness), material
+    variance = slope_variance(surface.normal_length)
+    frame = *surface.points[:3], -directions[hit]
+    return ReferencePoints(*frame, textures, roughness, slope_variance=variance), material
 
 
 def _sample_btf_surfaces(

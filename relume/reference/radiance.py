@@ -53,6 +53,7 @@ class ReferencePoints:
         uv: see `SurfaceInteraction`; None to use the mean of BTFs.
         alpha_sample: alpha sample for shadow rays at blended surfaces; see
             `relume.raytrace.surface_points.SurfacePoints`.
+        slope_variance: of normals within the pixel, or one for all.
     """
 
     position: Shaped[F32, "n 3"]
@@ -63,6 +64,7 @@ class ReferencePoints:
     roughness: Shaped[F32, " n"]
     uv: Shaped[F32, "n 5"] | None = None
     alpha_sample: Shaped[F32, " #n"] = field(default_factory=lambda: FIXED_ALPHA_SAMPLE)
+    slope_variance: Shaped[F32, " #n"] = field(default_factory=lambda: np.zeros(1, np.float32))
 
     @property
     def num_points(self) -> int:
@@ -81,7 +83,10 @@ class ReferencePoints:
         frame = self.normal[index], self.tangent[index], self.wo[index]
         uv = None if self.uv is None else self.uv[index]
         alpha_sample = self.alpha_sample if len(self.alpha_sample) == 1 else self.alpha_sample[index]
-        return ReferencePoints(self.position[index], *frame, textures, self.roughness[index], uv, alpha_sample)
+        variance = self.slope_variance if len(self.slope_variance) == 1 else self.slope_variance[index]
+        return ReferencePoints(
+            self.position[index], *frame, textures, self.roughness[index], uv, alpha_sample, variance
+        )
 
     def btf_surfaces(self, terms: Sequence[Document], rng: np.random.Generator) -> list[BtfSurface | None]:
         """Sample the BTF of each term at the points; None for other terms. rng: chooses positions in footprints"""

@@ -15,8 +15,16 @@ from relume.brdf.specular import is_mirror, specular_albedo
 from relume.brdf.texture_slots import roughness_image
 from relume.images.image_store import load_roughness_map, mean_roughness
 from relume.look import Look
+from relume.reference.radiance import ReferencePoints
 from relume.scene.model import Material, Scene
-from relume.scene.roughness_levels import levels_of_material, levels_of_texture, min_mean_normal_length, select_level
+from relume.scene.roughness_levels import (
+    ONE_LEVEL,
+    LevelGrid,
+    level_range,
+    levels_of_material,
+    levels_of_texture,
+    min_mean_normal_length,
+)
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -34,33 +42,31 @@ class RoughnessClasses:
         terms: terms of each class.
         mirrors: mirror fraction of each term of a class, per channel; zero unless the scene's own
             material is a mirror, because only those are traced in bakes.
-        first: first class of each material. ratios: relative roughness of each material's classes, empty for one.
+        first: first class of each material. grids: roughness levels of each material's classes.
     """
 
     terms: list[Terms]
     mirrors: list[list[F64]]
     first: list[int]
-    ratios: list[tuple[float, ...]]
+    grids: list[LevelGrid]
 
     def classify(
-        self, material: Shaped[NDArray[np.integer], " n"], roughness: Shaped[F32, " n"]
+        self, material: Shaped[NDArray[np.integer], " n"], points: ReferencePoints
     ) -> Shaped[NDArray[np.int64], " n"]:
-        """Return the classes of points.
-
-        Args:
-            material: index into the scene's materials. roughness: relative to the material's, see
-                `relume.raytrace.surface_interaction.SurfaceInteraction`.
-        """
+        """Return the classes of points. material: indices into the scene's materials"""
+        variance = np.broadcast_to(points.slope_variance, len(material))
         class_index: NDArray[np.int64] = np.array(self.first, np.int64)[material]
-        for index, ratios in enumerate(self.ratios):
-            if ratios:
+        for index, grid in enumerate(self.grids):
+            if grid.pairs:
                 rows = np.flatnonzero(material == index)
-                class_index[rows] += select_level(ratios, roughness[rows])
+                class_index[rows] += grid.select(points.roughness[rows], variance[rows])
         return class_index
 
 
-def _roughness_levels(material: Material, terms: Terms) -> tuple[float, ...]:
+def _level_grid(material: Material, terms: Terms) -> LevelGrid:
     """Roughness levels of the map that terms of a material use."""
+    if not any(map(uses_roughness_map, terms)):
+        return ONE_LEVEL
     name = roughness_image(terms)
     if name is None:
         return levels_of_material(material)
@@ -72,21 +78,16 @@ def _roughness_levels(material: Material, terms: Terms) -> tuple[float, ...]:
 def roughness_classes(scene: Scene, look: Look) -> RoughnessClasses:
     """Make the roughness classes of a scene's surfaces under a look."""
     material_terms = [look.materials[material.name].terms for material in scene.materials]
-    level_ranges = [
-        _roughness_levels(m, terms) if any(map(uses_roughness_map, terms)) else ()
-        for m, terms in zip(scene.materials, material_terms, strict=True)
-    ]
-    num = min(_MAX_CLASSES_PER_MATERIAL, max(2, _MAX_CLASSES // max(1, sum(map(bool, level_ranges)))))
+    grids = [_level_grid(m, terms) for m, terms in zip(scene.materials, material_terms, strict=True)]
+    num = min(_MAX_CLASSES_PER_MATERIAL, max(2, _MAX_CLASSES // max(1, sum(bool(grid.pairs) for grid in grids))))
     classes = RoughnessClasses([], [], [], [])
-    for material, terms, material_levels in zip(scene.materials, material_terms, level_ranges, strict=True):
-        ratios = (
-            tuple(np.square(np.linspace(material_levels[0] ** 0.5, material_levels[-1] ** 0.5, num)).tolist())
-            if material_levels
-            else ()
-        )
+    for material, terms, coarse in zip(scene.materials, material_terms, grids, strict=True):
+        has_both = len(coarse.ratios) > 1 and len(coarse.slope_variances) > 1
+        grid = level_range(coarse, *((max(2, num // 6), min(6, max(2, num // 2))) if has_both else (num, num)))
+        pairs = grid.pairs or ((1.0, 0.0),)
         classes.first.append(len(classes.terms))
-        classes.ratios.append(ratios)
-        classes.terms.extend([scaled_roughness(term, ratio) for term in terms] for ratio in ratios or (1.0,))
+        classes.grids.append(grid)
+        classes.terms.extend([scaled_roughness(term, *pair) for term in terms] for pair in pairs)
         mirrors = [specular_albedo(term) * is_mirror(material.terms) for term in terms]
-        classes.mirrors.extend(mirrors for _ in ratios or (1.0,))
+        classes.mirrors.extend(mirrors for _ in pairs)
     return classes

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import uses_roughness_map
 from relume.brdf.texture_slots import ROUGHNESS, TEXTURES, roughness_image, user_images
-from relume.images.image_store import load_normal_map, load_roughness_map, load_texture, mean_roughness
+from relume.images.image_store import load_normal_map, load_roughness_map, load_texture
 from relume.look import Look
 from relume.look.model import MeshLook
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Material, Mesh, Scene
-from relume.scene.roughness_levels import rougher
 from relume.scene_io.gltf.uvs import compute_tangents
 
 F32 = NDArray[np.float32]
@@ -126,6 +125,4 @@ def surface_roughness(
             rows = np.flatnonzero(material == index)
             roughness = roughness.copy()
             roughness[rows] = sample_image(load_roughness_map(name), surface.uv[rows])[:, 0]
-            if scene_material.normal_map is not None and (mean := mean_roughness(name)):
-                roughness[rows] = rougher(roughness[rows], surface.normal_length[rows], mean)
     return roughness

@@ -1,15 +1,13 @@
-"""Quantization of roughness maps into levels.
+"""Quantization of roughness maps, and of the variation of normals within pixels, into levels.
 
 A minified normal map makes a material rougher: normals vary within the footprint of a pixel. With their mean n̄, slopes
-have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a microfacet lobe with slope variance α² /
-2 widens to α² + 2 σ² (Olano and Baker 2010). With α = r²,
-
-    r'(x) = (r(x)⁴ + 2 σ²(x))^¼,   stored relative to the material's own roughness r.
-
-This is exact for the unedited r and scales in proportion if a look changes r.
+have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005). A level is a ratio of the roughness map together
+with a variance; the distribution of facets is convolved with that of the normals (`relume.brdf.roughness_levels`).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -25,23 +23,54 @@ MAX_LEVELS = 24
 # Levels are uniform in the square root of the roughness: with uniform roughness, steps would be visible at low
 # values, and with uniform log roughness at high ones.
 _STEP = 0.02
+_MAX_BOTH = 12, 8  # ratios and variances of a material with both
 _OUTLIER_FRACTION = 1e-3  # fraction of texels at each end of the range to ignore
 _BLOCKS = (8, 64)  # side lengths of texel blocks whose normals are averaged
 _MIN_LENGTH = 0.2  # clamp of mean normals; corresponds to more than any roughness
 
 
-def levels_of_material(material: Material) -> tuple[float, ...]:
-    """Roughness levels relative to the material's terms, ascending; empty if the roughness is uniform."""
+class LevelGrid(NamedTuple):
+    """Levels of a material: all pairs of a few ratios and a few slope variances, both ascending.
+
+    Attributes:
+        ratios: roughness relative to the material's. slope_variances: of normals within a pixel; the first is zero.
+    """
+
+    ratios: tuple[float, ...]
+    slope_variances: tuple[float, ...]
+
+    @property
+    def pairs(self) -> tuple[tuple[float, float], ...]:
+        """Ratio and variance of each level; none if there is only one."""
+        pairs = tuple((ratio, variance) for variance in self.slope_variances for ratio in self.ratios)
+        return pairs if len(pairs) > 1 else ()
+
+    def select(
+        self, ratio: Shaped[F32, " n"], variance: Shaped[F32, " n"], threshold: Shaped[F32, " n"] | float = 0.5
+    ) -> Shaped[NDArray[np.uint8], " n"]:
+        """Choose a level for each ratio and slope variance. threshold: see `select_level`."""
+        # the thresholds of both are independent: other digits of the same number
+        second = select_level(self.slope_variances, variance, np.mod(_NEXT_DIGIT * np.asarray(threshold), 1))
+        return np.asarray(second * np.uint8(len(self.ratios)) + select_level(self.ratios, ratio, threshold), np.uint8)
+
+
+_NEXT_DIGIT = 7
+ONE_LEVEL = LevelGrid((1.0,), (0.0,))
+"""Of a material without a roughness map."""
+
+
+def levels_of_material(material: Material) -> LevelGrid:
+    """Roughness levels relative to the material's terms."""
     texture, base = material.textures.get("roughness"), base_roughness(material)
     return levels_of_texture(texture, base, 1.0 if base is None else min_mean_normal_length(material.normal_map))
 
 
-def levels_of_texture(texture: Texture | None, base: float | None, min_length: float) -> tuple[float, ...]:
+def levels_of_texture(texture: Texture | None, base: float | None, min_length: float) -> LevelGrid:
     """Roughness levels over the range of a map, as `levels_of_material` returns them.
 
     Args:
         texture: roughness over its mean, as bytes; None for a constant 1.
-        base: mean roughness, see `rougher`; None without widening by normals.
+        base: mean roughness; None without an effect of normals.
         min_length: from `min_mean_normal_length`.
     """
     return levels_in_range(*ratio_range(texture), base, min_length)
@@ -60,18 +89,40 @@ def ratio_range(texture: Texture | None) -> tuple[float, float]:
     return float(low**2), float(high**2)
 
 
-def levels_in_range(lowest: float, highest: float, base: float | None, min_length: float) -> tuple[float, ...]:
-    """Roughness levels between the ratios `lowest` and `highest`, after widening by normals.
+def levels_in_range(lowest: float, highest: float, base: float | None, min_length: float) -> LevelGrid:
+    """Roughness levels between the ratios `lowest` and `highest`, with the variances that normals have.
 
     base, min_length: see `levels_of_texture`.
     """
-    if base is not None and min_length < 1:
-        highest = float(rougher(np.array([highest], np.float32), np.array([min_length], np.float32), base)[0])
-    low, high = np.sqrt(lowest), np.sqrt(highest)
-    num_levels = 1 + min(MAX_LEVELS - 1, int(np.ceil((high - low) / _STEP)))
-    if num_levels < 3:
-        return ()
-    return tuple(np.round(np.square(np.linspace(low, high, num_levels)), 6).tolist())
+    most = 0.0 if base is None else float(slope_variance(np.array([min_length], np.float32))[0])
+    widest = 1.0 if base is None else (1 + 2 * most / base**4) ** 0.25
+    limits = _MAX_BOTH if _num_steps(lowest, highest) > 2 and _num_steps(1, widest) > 2 else (MAX_LEVELS, MAX_LEVELS)
+    ratios, widths = _between(lowest, highest, limits[0]), _between(1, widest, limits[1])
+    variances = [0.0 if base is None else round((width**4 - 1) * base**4 / 2, 9) for width in widths]
+    return LevelGrid(ratios, tuple(variances))
+
+
+def level_range(grid: LevelGrid, num_ratios: int, num_variances: int) -> LevelGrid:
+    """Return other numbers of levels over the range of a grid; one stays one.
+
+    Args:
+        grid: any. num_ratios, num_variances: the numbers.
+    """
+    ratios, variances = (np.sqrt(np.array(axis)) for axis in grid)
+    numbers = (num if len(axis) > 1 else 1 for axis, num in zip(grid, (num_ratios, num_variances), strict=True))
+    axes = (np.linspace(axis[0], axis[-1], num) for axis, num in zip((ratios, variances), numbers, strict=True))
+    return LevelGrid(*(tuple(np.square(axis).tolist()) for axis in axes))
+
+
+def _num_steps(low: float, high: float) -> int:
+    """Number of levels between two ratios."""
+    return 1 + int(np.ceil((np.sqrt(high) - np.sqrt(low)) / _STEP))
+
+
+def _between(low: float, high: float, most: int) -> tuple[float, ...]:
+    """Ratios between two; 1 if a level would be enough."""
+    num = min(most, _num_steps(low, high))
+    return (1.0,) if num < 3 else tuple(np.round(np.square(np.linspace(np.sqrt(low), np.sqrt(high), num)), 6).tolist())
 
 
 def base_roughness(material: Material) -> float | None:
@@ -83,23 +134,8 @@ def base_roughness(material: Material) -> float | None:
     return next((float(np.mean(value)) for value in roughness_values if value is not None), None)
 
 
-def rougher(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) -> Shaped[F32, " n"]:
-    """Roughness relative to `base`, widened by the variation of normals.
-
-    Args:
-        ratio: ratio of a roughness map. length: length of the mean normal, at most 1.
-        base: the roughness of the material's terms.
-    """
-    return np.asarray(((base * ratio) ** 4 + 2 * _variance(length)) ** 0.25 / base, np.float32)
-
-
-def smoother(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) -> Shaped[F32, " n"]:
-    """Roughness `ratio` of `base` without the widening by normals of mean `length`: the inverse of `rougher`."""
-    return np.asarray(np.maximum((base * ratio) ** 4 - 2 * _variance(length), 0) ** 0.25 / base, np.float32)
-
-
-def _variance(length: F32) -> F32:
-    """Slope variance σ² of normals whose mean has this length. (n,)"""
+def slope_variance(length: Shaped[F32, " n"]) -> Shaped[F32, " n"]:
+    """Slope variance σ² along each axis of normals whose mean has a length, at most 1."""
     clamped = np.clip(length, _MIN_LENGTH, 1)
     return np.asarray((1 - clamped) / clamped, np.float32)
 
@@ -110,13 +146,13 @@ def select_level(
     """Choose one of the two levels that enclose each ratio.
 
     Args:
-        ratios: ratios of the levels, ascending. ratio: ratio to quantize.
+        ratios: ratios of the levels, or variances, ascending. ratio: to quantize.
         threshold: smallest fractional position for the higher level, in (0, 1). Thresholds that vary between neighbors
             dither the levels, so that no contours are visible.
     """
     roots, root = np.sqrt(ratios), np.sqrt(ratio)
     level = np.interp(root, roots, np.arange(len(roots)))
-    return np.asarray(level + 1 - threshold, np.uint8)
+    return np.asarray(np.minimum(level + 1 - threshold, len(ratios) - 1), np.uint8)
 
 
 def min_mean_normal_length(normals: Texture | None) -> float:

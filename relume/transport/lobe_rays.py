@@ -22,12 +22,20 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.angles import angle_at
 from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.fast_math import acos_clamped, azimuth_fraction
 from relume.math.rgb9e5 import unpack_rgb9e5
 from relume.patches.patch_kdtree import NO_PATCH
-from relume.raytrace.lobe_directions import LobePattern, lobe_density, lobe_ray, lobe_shift, ray_jitter
+from relume.raytrace.lobe_directions import (
+    LobePattern,
+    lobe_density,
+    lobe_ray,
+    lobe_shift,
+    mirrored_axis,
+    ray_jitter,
+)
 from relume.transport.gather_kernel import in_frame
 from relume.transport.hit_textures import TexturedLight
 from relume.transport.light_culling import ListedLights, half_angle_reach
@@ -174,11 +182,15 @@ def _triangle_share(pattern, level, radius, solid_angle, spread, ix, iy, iz, ox,
     """
     if pattern.is_half_angle:
         reach, cos_theta_d = half_angle_reach(radius, ix, iy, iz, ox, oy, oz)
-        angle = acos_clamped(_HALF * (iz + oz) / max(cos_theta_d, np.float32(1e-6))) - reach - spread
+        reach += spread
     else:
-        cos_theta_d = _ONE
-        angle = acos_clamped(iz * oz - ix * ox - iy * oy) - radius - _TWO * spread
-    band = min(int(pattern.scale * max(angle, _ZERO)), pattern.band_density.shape[1] - 1)
+        reach, cos_theta_d = radius + _TWO * spread, _ONE
+        ox, oy, oz = mirrored_axis(pattern, ox, oy, oz)
+    band = 0
+    for k in range(pattern.angles.shape[0]):
+        angle = angle_at(pattern.angles[k], ix, iy, iz, ox, oy, oz) - reach
+        nearest = min(int(pattern.scale * max(angle, _ZERO)), pattern.band_density.shape[1] - 1)
+        band = band * pattern.band_density.shape[1] + nearest
     ratio = _PER_ENOUGH_RAYS * solid_angle * lobe_density(pattern, level, band, cos_theta_d)
     share = _ONE / (_ONE + ratio * ratio)
     return share if share > _LEAST_SHARE else _ZERO

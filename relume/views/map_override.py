@@ -24,9 +24,7 @@ from relume.scene.roughness_levels import (
     levels_in_range,
     min_mean_normal_length,
     ratio_range,
-    rougher,
-    select_level,
-    smoother,
+    slope_variance,
 )
 from relume.views.map_override_store import MapOverrideStore, RayTracer
 from relume.views.normal_override import PerturbedNormals, perturbed
@@ -64,7 +62,7 @@ def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: Ra
     cached = view.overridden.get(maps)
     if cached is not None or not any(maps):
         return cached or view
-    rows, level, ratios = view.unmodified(), view.level.copy(), list(view.ratios)
+    rows, level, pairs = view.unmodified(), view.level.copy(), list(view.level_pairs)
     perturbed_by_row, materials = dict[int, PerturbedNormals](), dict[int, int]()
     for material, override in enumerate(maps):
         material_rows = view.rows(material)
@@ -73,7 +71,7 @@ def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: Ra
         if override.normals is not None:
             tracer.check()
         perturbed_normals = None if override.normals is None else perturbed(view, material, override.normals)
-        ratios[material], sample_levels = _overridden_levels(view, material, override, perturbed_normals)
+        pairs[material], sample_levels = _overridden_levels(view, material, override, perturbed_normals)
         code = morton(view.pixel[material_rows].astype(np.int64), view.width)
         order = np.lexsort((code, sample_levels))
         level[material_rows], rows[material_rows] = sample_levels[order], rows[material_rows][order]
@@ -83,9 +81,7 @@ def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: Ra
                 material,
             )
     tracer_arguments = tracer, view.cache, (view.key, view.name, maps)
-    store = MapOverrideStore(
-        view.store, view.index, rows, level, ratios, perturbed_by_row, materials, *tracer_arguments
-    )
+    store = MapOverrideStore(view.store, view.index, rows, level, pairs, perturbed_by_row, materials, *tracer_arguments)
     view.overridden[maps] = overridden = open_view(store, view.index, view.cache, view.key, maps, rows)
     return overridden
 
@@ -98,7 +94,7 @@ def _overridden_levels(
     shortest = read_shortest_normals(store)[material]
     length = read_normal_length(store, view.index, rows.start, rows.stop)
     if override.roughness is None:
-        ratio, low, high = _map_roughness(view, material, base_roughness, length, shortest)
+        ratio, low, high = _map_roughness(view, material)
     else:
         uv, texture = read_uv(store, view.index, rows.start, rows.stop), load_roughness_map(override.roughness)
         if uv is None:
@@ -107,25 +103,13 @@ def _overridden_levels(
         ratio, (low, high) = sample_image(texture, uv)[:, 0], ratio_range(texture)
     if perturbed_normals is not None and override.normals is not None:
         length, shortest = perturbed_normals.normal_length, min_mean_normal_length(load_normal_map(override.normals))
-    ratios = levels_in_range(low, high, base_roughness, shortest)
-    if not ratios:
-        return RoughnessLevels(ratios, np.zeros(rows.stop - rows.start, np.uint8))
-    if base_roughness and shortest < 1:
-        ratio = rougher(ratio, length, base_roughness)
-    pixel = view.pixel[rows].astype(np.int64)
-    return RoughnessLevels(ratios, select_level(ratios, ratio, dither_thresholds(pixel, view.width)))
+    grid = levels_in_range(low, high, base_roughness, shortest)
+    threshold = dither_thresholds(view.pixel[rows].astype(np.int64), view.width)
+    return RoughnessLevels(grid.pairs, grid.select(ratio, slope_variance(length), threshold))
 
 
-def _map_roughness(
-    view: View, material: int, base_roughness: float | None, length: F32, shortest: float
-) -> tuple[F32, float, float]:
-    """Relative roughness of a material's samples from the scene's map, without the effect of normal variation; and the
-    ends of the map's range."""
-    ratios, level = view.ratios[material], view.level[view.rows(material)]
-    if not ratios or ratios[0] == 1:  # there is no map; only normal variation adds levels
-        return np.ones(len(level), np.float32), 1.0, 1.0
-    ratio, low, high = np.array(ratios, np.float32)[level], ratios[0], ratios[-1]
-    if base_roughness is None or shortest == 1:
-        return ratio, low, high
-    highest = smoother(np.array([high], np.float32), np.array([shortest], np.float32), base_roughness)
-    return smoother(ratio, length, base_roughness), low, max(low, float(highest[0]))
+def _map_roughness(view: View, material: int) -> tuple[F32, float, float]:
+    """Relative roughness of a material's samples from the scene's map, and the ends of the map's range."""
+    pairs, level = view.level_pairs[material], view.level[view.rows(material)]
+    ratios = np.array([ratio for ratio, _ in pairs] or [1.0], np.float32)
+    return ratios[level], float(ratios.min()), float(ratios.max())

@@ -107,7 +107,7 @@ class MapOverrideStore:
         store: the other store. view: index of the view.
         rows: row of each sample in the other store. (surface samples,)
         level: roughness level of each sample in this store. (surface samples,) uint8
-        ratios: ratios of each material's levels.
+        level_pairs: levels of each material, see `RoughnessLevels`.
         perturbed: samples with overridden normals, by the first row of their material; in the order of this store.
         materials: index of each of these materials. tracer: tracer for their rays.
         cache, key: cache for traced rays, and key of the bake in it.
@@ -119,7 +119,7 @@ class MapOverrideStore:
         view: int,
         rows: RowIndices,
         level: NDArray[np.uint8],
-        ratios: Sequence[tuple[float, ...]],
+        level_pairs: Sequence[tuple[tuple[float, float], ...]],
         perturbed: Mapping[int, PerturbedNormals],
         materials: Mapping[int, int],
         tracer: RayTracer,
@@ -129,7 +129,7 @@ class MapOverrideStore:
         self._store, self._view, self._rows, self._level = store, view, rows, level
         self._prefix, self._perturbed, self._materials = f"views/{view}/", perturbed, materials
         self._tracer, self._cache, self._key = tracer, cache, key
-        self._attributes = {**store.attributes, "roughness_levels": list(map(list, ratios))}
+        self._attributes = {**store.attributes, "roughness_levels": [list(map(list, pairs)) for pairs in level_pairs]}
 
     @property
     def attributes(self) -> Mapping[str, Any]:

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from relume.brdf.texture_slots import NormalMap
 from relume.core.errors import StoreError
 from relume.images.image_store import load_normal_map
-from relume.raytrace.shading_normals import flip_to_viewer, mapped_normal, visible_length
+from relume.raytrace.shading_normals import flip_to_viewer, footprint_sides, mapped_normal, mean_normal
 from relume.raytrace.tangents import project_to_tangent, rotation_between
-from relume.raytrace.texture import MipMap, sample_image
 from relume.views.store_io import read_ray_origins, read_surface_normal, read_uv, view_directions
 from relume.views.view import View
 
@@ -87,13 +86,12 @@ def perturb_normals(
     texture_axis = np.asarray(np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent), np.float32)
     texture_axis = unproject(texture_axis, normal, smooth)
     texture = load_normal_map(map_)
-    mapped = sample_image(texture, uv)
+    mapped, length = mean_normal(texture, uv[:, :2], footprint_sides(uv, texture_axis, smooth, wo))
     new_normal = mapped_normal(mapped, smooth, np.column_stack([texture_axis, uv[:, 4]]), smooth)
     new_normal = flip_to_viewer(new_normal, -wo)
     new_tangent = project_to_tangent(unproject(tangent, normal, smooth), new_normal)
     new_uv = uv.copy()
     new_uv[:, 3] = rotation_between(new_normal, new_tangent, texture_axis)
-    length = visible_length(mapped, MipMap.for_texture(texture).texels(uv[:, 2]))
     return PerturbedNormals(new_normal, new_tangent, new_uv, length, np.asarray(normal, np.float32))
 
 

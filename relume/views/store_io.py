@@ -165,12 +165,18 @@ def read_shortest_normals(store: StoreReader) -> list[float]:
     return [1.0] * len(store.attributes["materials"]) if lengths is None else list(map(float, lengths))
 
 
-def read_roughness_ratios(store: StoreReader) -> tuple[tuple[float, ...], ...]:
-    """Read the roughness levels of all materials: relative to the material's roughness, none without a map."""
-    ratios = store.attributes.get("roughness_levels")
-    if ratios is None:
+def read_level_pairs(store: StoreReader) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """Read the roughness levels of all materials, none without a map: roughness by the material's, and slope variance.
+
+    Older bakes have the former alone, which contains the effect of the latter.
+    """
+    levels = store.attributes.get("roughness_levels")
+    if levels is None:
         return ((),) * len(store.attributes["materials"])
-    return tuple(tuple(map(float, material_ratios)) for material_ratios in ratios)
+    return tuple(
+        tuple((float(np.ravel(level)[0]), float(np.ravel(level)[-1]) if np.size(level) > 1 else 0.0) for level in each)
+        for each in levels
+    )
 
 
 def read_roughness_levels(store: StoreReader, k: int, num_samples: int) -> Shaped[NDArray[np.uint8], " n"]:
@@ -179,6 +185,6 @@ def read_roughness_levels(store: StoreReader, k: int, num_samples: int) -> Shape
     Args:
         store: an open store. k: index of the view. num_samples: number of surface samples.
     """
-    if not any(read_roughness_ratios(store)):
+    if not any(read_level_pairs(store)):
         return np.zeros(num_samples, np.uint8)
     return np.asarray(store.read(f"views/{k}/level", 0, num_samples), np.uint8)

@@ -34,9 +34,9 @@ from relume.views.store_io import (
     TransferReader,
     make_material_pattern,
     read_camera,
+    read_level_pairs,
     read_ray_origins,
     read_roughness_levels,
-    read_roughness_ratios,
     read_seeds,
     read_surface_points,
     read_uv,
@@ -65,7 +65,7 @@ class View:
         mirrored: samples in mirrors; None if there are none.
         is_mirrored: surface samples on mirrors whose reflection is in other samples.
         textures: textures of each material, the scene's textures that are not 1 everywhere, by name. (n, 3)
-        level: roughness levels, ascending within a material. ratios: ratios of each material's levels.
+        level: roughness levels, ascending within a material. level_pairs: of each material, see `RoughnessLevels`.
         frost: filter of the samples behind frosted glass; None without any.
         maps: overridden maps of each material, see `relume.views.map_override`; empty if there are none.
         baked_rows: row of each surface sample in baked order; None: in that order.
@@ -90,7 +90,7 @@ class View:
     textures: Sequence[Mapping[str, F32]]
     cos_theta_o: Shaped[NDArray[np.float64], " surface_samples"]
     level: Shaped[NDArray[np.uint8], " surface_samples"]
-    ratios: tuple[tuple[float, ...], ...]
+    level_pairs: tuple[tuple[tuple[float, float], ...], ...]
     frost: FrostFilter | None = None
     maps: tuple[Hashable | None, ...] = ()
     baked_rows: Shaped[NDArray[np.int64], " surface_samples"] | None = field(default=None, repr=False)
@@ -139,7 +139,7 @@ class View:
 
     def roughness_levels(self, material: int) -> RoughnessLevels:
         """Roughness levels of a material's samples."""
-        return RoughnessLevels(self.ratios[material], self.level[self.rows(material)])
+        return RoughnessLevels(self.level_pairs[material], self.level[self.rows(material)])
 
     def image(self, material: int, name: str) -> Shaped[F32, "n 3"]:
         """Look up an image of a look at a material's samples.
@@ -202,7 +202,7 @@ class View:
         visible = self._read_visibility(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
         surface_points = self.surface_points(material)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
-        level = self.level[rows] if self.ratios[material] else None
+        level = self.level[rows] if self.level_pairs[material] else None
         wo = view_directions(self.ray_origins(rows), surface_points.position)
         return ShadingPoints(surface_points, wo, visible, (), uv, level)
 
@@ -372,8 +372,8 @@ def open_view(
     if num_surface and int(material[num_surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that does not exist in the scene")
     bounds = np.searchsorted(material[:num_surface], np.arange(num_materials + 1)).astype(np.int64)
-    level, ratios = read_roughness_levels(store, index, num_surface), read_roughness_ratios(store)
-    if any(not _are_valid_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], ratios, strict=True)):
+    level, pairs = read_roughness_levels(store, index, num_surface), read_level_pairs(store)
+    if any(not _are_valid_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], pairs, strict=True)):
         raise ChunkDamagedError(prefix, "its roughness levels do not fit its materials")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
     origin = read_ray_origins(store, index, 0, num_surface)
@@ -401,7 +401,7 @@ def open_view(
         textures=[_textures(store, prefix, *ends) for ends in pairwise(bounds.tolist())],
         cos_theta_o=_cos_theta_o(store, prefix, origin, num_surface),
         level=level,
-        ratios=ratios,
+        level_pairs=pairs,
         maps=maps,
         baked_rows=rows,
     )
@@ -433,6 +433,6 @@ def _cos_theta_o(store: StoreReader, prefix: str, origin: F32, num: int) -> NDAr
     return cosines
 
 
-def _are_valid_levels(level: NDArray[np.uint8], ratios: tuple[float, ...]) -> bool:
+def _are_valid_levels(level: NDArray[np.uint8], pairs: tuple[tuple[float, float], ...]) -> bool:
     """True if the levels of a material's samples are ascending and exist."""
-    return len(level) == 0 or (int(level[-1]) < max(1, len(ratios)) and bool(np.all(level[1:] >= level[:-1])))
+    return len(level) == 0 or (int(level[-1]) < max(1, len(pairs)) and bool(np.all(level[1:] >= level[:-1])))

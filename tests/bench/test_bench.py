@@ -34,7 +34,7 @@ LONG = [
     "btf_edit", "many_sessions", "refusal", "slider_drag", "probes_static_view", "rotation",
     "btf_several", "plan_disk", "probes_live", "probes_error", "real_files",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
-    "sharp", "sharp_room", "sharp_checker", "sharp_free_camera", "sharp_edits",
+    "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits",
 ]  # fmt: skip
 # figures from random points or a noisy renderer have a standard error
 ESTIMATES = (

@@ -19,7 +19,7 @@ from relume.brdf.term_validation import complete_term
 from relume.core.errors import ParameterError
 
 WIDE = [term for term in TERMS.values() if term.width is not None and term.model != "ggx_multiple"]  # no highlight
-LEVELS = RoughnessLevels((0.5, 1.0, 1.5), np.array([0, 0, 1, 2, 2, 2], np.uint8))
+LEVELS = RoughnessLevels(((0.5, 0.0), (1.0, 0.0), (1.5, 0.02)), np.array([0, 0, 1, 2, 2, 2], np.uint8))
 
 
 def document(model, **more):
@@ -52,14 +52,37 @@ def test_parameters_stay_in_their_range() -> None:
     assert scaled_roughness(document("phong"), 0.01)["params"]["exponent"] == 1e5
 
 
+def test_facets_are_convolved_with_the_slopes_of_normals() -> None:
+    """Against the sum over many normals; the tail stays that of GGX."""
+    alpha, sigma, theta = 0.04, 0.1, np.radians([0.0, 2.0, 8.0, 20.0, 60.0])
+    level = scaled_roughness(document("ggx", params={"roughness": alpha**0.5, "f0": 0.5}), 1.0, sigma**2)
+    values = curve_values(level, TERMS["ggx"].curve("theta_h"), theta)[0]
+    x = np.linspace(-6 * sigma, 6 * sigma, 1201)
+    gauss = np.exp(-np.add.outer(x**2, x**2) / (2 * sigma**2))
+    for angle, value in zip(theta, values, strict=True):
+        squared = np.add.outer((x - np.tan(angle)) ** 2, x**2)
+        slopes = alpha**2 / (np.pi * (alpha**2 + squared) ** 2)
+        expected = (slopes * gauss).sum() / gauss.sum() / np.cos(angle) ** 4
+        assert value == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("model", ["ward", "cook_torrance", "blinn_phong"])
+def test_other_lobes_are_as_wide_as_their_facets_and_the_normals(model) -> None:
+    """Half of the energy of slopes lies within √(ln 2 (α² + 2 σ²)), for Gaussian ones."""
+    name, value = {"ward": ("alpha", 0.05), "cook_torrance": ("sigma", 0.05), "blinn_phong": ("exponent", 800.0)}[model]
+    params = scaled_roughness(document(model, params={name: value}), 1.0, 0.1**2)["params"][name]
+    expected = 2 / (0.05**2 + 2 * 0.1**2) if model == "blinn_phong" else (0.05**2 + 2 * 0.1**2) ** 0.5
+    assert params == pytest.approx(expected, rel=1e-6)
+
+
 def test_only_curves_of_the_width_differ_between_levels() -> None:
     term, curves = document("ggx"), {curve.name: curve for curve in TERMS["ggx"].curves}
     assert level_bands(term, curves["theta_h"], LEVELS).shape == (3, 3, 256)
     assert level_bands(term, curves["theta_d"], LEVELS).shape == (3, 64)
     assert level_bands(term, curves["theta_h"], NO_LEVELS).shape == (3, 256)
     assert level_bands({**term, "roughness_map": None}, curves["theta_h"], LEVELS).shape == (3, 256)
-    for k, ratio in enumerate(LEVELS.ratios):
-        expected = curve_bands(scaled_roughness(term, ratio), curves["theta_h"])
+    for k, pair in enumerate(LEVELS.pairs):
+        expected = curve_bands(scaled_roughness(term, *pair), curves["theta_h"])
         np.testing.assert_array_equal(level_bands(term, curves["theta_h"], LEVELS)[k], expected)
 
 
@@ -75,7 +98,7 @@ def test_each_sample_has_the_values_of_its_level() -> None:
     gamma = np.linspace(0.2, 1.5, 6)
     actual = level_values(term, curve, gamma, LEVELS)
     for sample, level in enumerate(LEVELS.level):
-        expected = curve_values(scaled_roughness(term, LEVELS.ratios[level]), curve, gamma[sample : sample + 1])
+        expected = curve_values(scaled_roughness(term, *LEVELS.pairs[level]), curve, gamma[sample : sample + 1])
         np.testing.assert_allclose(actual[:, sample], expected[:, 0])
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from relume.brdf.lobe_sampling import MAX_MEDIAN, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS, RoughnessLevels
+from relume.brdf.term import Angle
 from relume.brdf.term_validation import complete_term
 from relume.math.angle_bands import band_edges
 
@@ -33,6 +34,31 @@ def test_angles_of_phong_have_its_distribution():
     assert np.cos(lobe.median[0]) ** 1001 == pytest.approx(0.5, rel=5e-3)
 
 
+def test_angles_of_an_anisotropic_lobe_have_its_distributions():
+    lobe = sample_lobe(document("ward_anisotropic", alpha_x=0.02, alpha_y=0.3), NO_LEVELS)
+    assert lobe.angles == (Angle.TILT_X, Angle.TILT_Y)
+    fraction = np.linspace(0, 1, lobe.quantile.shape[1])
+    for row, alpha in enumerate((0.02, 0.3)):
+        gamma = np.linspace(0, 1.5, 200_001)
+        density = np.exp(-((np.tan(gamma) / alpha) ** 2))
+        expected = np.interp([0.2, 0.5, 0.9], np.cumsum(density) / density.sum(), gamma)
+        np.testing.assert_allclose(np.interp([0.2, 0.5, 0.9], fraction, lobe.quantile[row]), expected, rtol=0.01)
+        assert lobe.band_density[row].sum() * np.pi / lobe.band_density.shape[1] == pytest.approx(1, rel=1e-5)
+
+
+def test_a_lobe_that_is_narrow_along_one_direction_is_traced():
+    assert sample_lobe(document("ashikhmin_shirley", nu=20.0, nv=2e4), NO_LEVELS).is_narrow.tolist() == [True]
+    assert sample_lobe(document("ashikhmin_shirley", nu=100.0, nv=100.0), NO_LEVELS) is None
+
+
+def test_lafortune_is_about_its_axis():
+    lobe = sample_lobe(document("lafortune", exponent=1e4, c_x=0.5, c_y=1.0), NO_LEVELS)
+    assert lobe.axes == (-0.5, -1.0, 1.0)
+    assert not lobe.is_round
+    assert sample_lobe(document("lafortune", exponent=1e4), NO_LEVELS).is_round
+    assert sample_lobe(document("lafortune", exponent=1e4, c_x=0.0, c_y=0.0, c_z=0.0), NO_LEVELS) is None
+
+
 def test_densities_of_all_bands_sum_to_one():
     lobe = sample_lobe(document("ggx", roughness=0.15), NO_LEVELS)
     solid_angles = 2 * np.pi * -np.diff(np.cos(band_edges(lobe.band_density.shape[1])))
@@ -42,7 +68,7 @@ def test_densities_of_all_bands_sum_to_one():
 
 def test_each_roughness_level_has_its_own_lobe():
     mapped = {**document("ggx", roughness=0.1), "roughness_map": True}
-    lobe = sample_lobe(mapped, RoughnessLevels((0.5, 2.0, 4.0), np.zeros(1, np.uint8)))
+    lobe = sample_lobe(mapped, RoughnessLevels(((0.5, 0.0), (2.0, 0.0), (4.0, 0.0)), np.zeros(1, np.uint8)))
     assert lobe.is_narrow.tolist() == [True, True, False]
     ratio = lobe.quantile[1, 2048] / lobe.quantile[0, 2048]
     assert ratio == pytest.approx(16, rel=0.02)
@@ -63,6 +89,7 @@ def test_a_drawn_spike_is_sampled_where_it_is():
         document("ggx", roughness=0.5),
         document("ashikhmin_shirley"),
         {**document("ggx"), "curves": {"theta_h": {"points": [[0, 0], [90, 0]]}}},
+        {**document("ward_anisotropic", alpha_x=0.01), "curves": {"tilt_y": {"points": [[0, 0], [90, 0]]}}},
     ],
 )
 def test_wide_and_black_terms_have_no_lobe_rays(given):

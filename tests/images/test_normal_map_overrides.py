@@ -166,7 +166,7 @@ def test_normals_and_roughness_levels_equal_the_bake(bakes, plain, named):
     picture = Picture(bare, "front", bare.cache)
     picture.set_look(normal_mapped(plain, named))
     view, expected = picture._images.view, baked.views["front"]
-    np.testing.assert_allclose(view.ratios[0], expected.ratios[0], rtol=1e-5)
+    np.testing.assert_allclose(view.level_pairs[0], expected.level_pairs[0], rtol=1e-5)
     assert np.mean(view.level == expected.level) > 0.95
     assert len(np.unique(view.level)) > 8
     (rows, actual), (their_rows, theirs) = (_normals_of(each) for each in (view, expected))

@@ -106,7 +106,7 @@ def test_roughness_levels_equal_the_bake(bakes, plain, named):
     other.set_look(rough(plain, named, 0.3))
     view, expected = picture._images.view, baked.views["front"]
     assert other._images.view is view  # pictures with the same map share the sorted view
-    np.testing.assert_allclose(view.ratios[0], expected.ratios[0], rtol=1e-5)
+    np.testing.assert_allclose(view.level_pairs[0], expected.level_pairs[0], rtol=1e-5)
     assert np.all(view.level == expected.level)
     assert len(np.unique(view.level)) > 8
 

@@ -144,3 +144,12 @@ def test_projected_points_are_weighted_means_of_single_points(model, is_active, 
     shared = project((replace(alone, sharing=neighbor_filter),), [(0, 50), (50, num)]) - dark
     expected = np.einsum("pq,qjc->pjc", np.linalg.matrix_power(of_term.matrix.toarray(), times), separate)
     np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())
+
+
+def test_a_filter_within_some_samples_ignores_all_others():
+    pixel, position, normal = grid()
+    weights = filter_of(pixel, position, normal).highlights
+    is_member = np.random.default_rng(2).random(len(pixel)) < 0.6
+    expected = weights.matrix.toarray() * is_member * is_member[:, None]
+    expected[is_member] /= expected[is_member].sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(weights.within(is_member).matrix.toarray(), expected, rtol=1e-5)

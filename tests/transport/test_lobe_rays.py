@@ -11,9 +11,11 @@ from rgb9e5 import rgb9e5_pack
 
 from relume.assets.environments.equirect import lookup, rotate_about_y
 from relume.brdf.curves import curve_bands, curve_values
+from relume.brdf.evaluate import angles_numpy
 from relume.brdf.lobe_sampling import sample_lobe
 from relume.brdf.registry import TERMS
 from relume.brdf.roughness_levels import NO_LEVELS
+from relume.brdf.term import Angle
 from relume.brdf.term_validation import complete_term
 from relume.lights.sphere_tiles import choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
@@ -73,7 +75,7 @@ def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotat
 
 
 def shade(term_document, lights, receivers):
-    term = TERMS[term_document["model"]]
+    term = TERMS[term_document["model"]].normalized(term_document)
     bands = {c.name: curve_bands(term_document, c) for c in term.curves if not c.depends_on_view}
     shader = Shader(term, contract(term, bands, None), lights, receivers)
     return shader.project(0, len(receivers.normal))[:, 0].astype(float)
@@ -95,12 +97,11 @@ def brute_force(term_document, normal, wo, radiance_along):
     cos_d = h @ local_o
     i = 2 * cos_d[..., None] * h - local_o
     weight = (np.sin(middle) * width)[:, None] * (2 * np.pi / 720) * 4 * np.maximum(cos_d, 0) * np.maximum(i[..., 2], 0)
-    angles = {"theta_h": np.broadcast_to(middle[:, None], cos_d.shape), "theta_d": np.arccos(np.clip(cos_d, 0, 1)),
-              "theta_i": np.arccos(np.clip(i[..., 2], 0, 1))}  # fmt: skip
     value = term.quotients(*np.moveaxis(i, -1, 0), *local_o)[0] * weight
     for curve in term.curves:
         if not curve.depends_on_view:
-            value = value * curve_values(term_document, curve, angles[curve.name])[0]
+            angle = middle[:, None] if curve.angle is Angle.THETA_H else angles_numpy(curve.angle, i, local_o)
+            value = value * curve_values(term_document, curve, np.broadcast_to(angle, cos_d.shape))[0]
     keep = value > 0
     light = radiance_along((i[keep] @ frame).astype(np.float32))
     return (value[keep][:, None] * light).sum(axis=0)
@@ -115,6 +116,44 @@ def test_white_light_is_reflected_without_loss_or_noise(roughness, degrees):
     expected = brute_force(chrome, normal, wo, lambda directions: np.ones((len(directions), 3)))
     np.testing.assert_allclose(radiance.mean(axis=0), expected, rtol=0.01)
     assert radiance.std() < 0.02 * expected[0]
+
+
+ANISOTROPIC = [
+    document("ward_anisotropic", alpha_x=0.005, alpha_y=0.005),
+    document("ward_anisotropic", alpha_x=0.01, alpha_y=0.2),
+    document("ward_anisotropic", alpha_x=1.0, alpha_y=0.02),
+    document("ashikhmin_shirley", nu=1e5, nv=1e5, f0=1.0),
+    document("ashikhmin_shirley", nu=20.0, nv=2e4, f0=1.0),
+]
+
+
+@pytest.mark.parametrize("gloss", ANISOTROPIC)
+@pytest.mark.parametrize("degrees", [0, 50])
+def test_anisotropic_lobes_reflect_white_light_without_loss_or_noise(gloss, degrees):
+    normal, wo = view(degrees)
+    white = np.ones((64, 128, 3), np.float32)
+    radiance = shade(gloss, *with_lobe_rays(gloss, normal, wo, white, num_rays=233))
+    expected = brute_force(gloss, normal, wo, lambda directions: np.ones((len(directions), 3)))
+    np.testing.assert_allclose(radiance.mean(axis=0), expected, rtol=0.015)
+    assert radiance.std() < 0.04 * expected[0]
+
+
+@pytest.mark.parametrize("gloss", ANISOTROPIC)
+def test_rays_and_triangles_of_an_anisotropic_lobe_together_are_the_integral(gloss):
+    radiance_map, (normal, wo) = gradient_with_sun(), view(20)
+    lights, receivers = with_lobe_rays(gloss, normal, wo, radiance_map, num_lights=1500, num_rays=233)
+    expected = brute_force(gloss, normal, wo, lambda directions: lookup(radiance_map, directions))
+    np.testing.assert_allclose(shade(gloss, lights, receivers).mean(axis=0), expected, rtol=0.03)
+
+
+@pytest.mark.parametrize(("mirror", "degrees"), [(-1.0, 40), (1.0, 40), (1.0, 0)])
+def test_a_lafortune_lobe_is_about_the_mirror_direction_or_the_viewer(mirror, degrees):
+    """(s + 2) / (s + 1) cos θ of white light."""
+    gloss, (normal, wo) = document("lafortune", exponent=5e4, c_x=mirror, c_y=mirror), view(degrees)
+    white = np.ones((64, 128, 3), np.float32)
+    radiance = shade(gloss, *with_lobe_rays(gloss, normal, wo, white))
+    np.testing.assert_allclose(radiance.mean(axis=0), np.cos(np.radians(degrees)), rtol=2e-3)
+    assert radiance.std() < 0.01
 
 
 def gradient_with_sun():

@@ -29,7 +29,7 @@ def make_view(width=100, height=70, seed=0):
         bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         order=order, throughput=weight[order, None].astype(np.float32), origin=np.zeros((1, 3), np.float32),
         mirrored=None, is_mirrored=np.zeros(len(pixel), np.bool_), textures={}, cos_theta_o=np.ones(len(pixel)),
-        level=np.zeros(len(pixel), np.uint8), ratios=((),),
+        level=np.zeros(len(pixel), np.uint8), level_pairs=((),),
     )  # fmt: skip
 
 

@@ -11,6 +11,8 @@ from relume.brdf.half_vector import MIN_COSINE, ZERO, quotient_ufunc
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 _QUARTER = np.float32(0.25)
+_LOG_E, _NUM_NODES = (-18.0, 3.6), 37
+_MIN_COS2 = 1e-12  # grazing facets have no slope
 
 
 @quotient_ufunc
@@ -33,16 +35,42 @@ def roughness_to_alpha(roughness: float) -> float:
 
 
 def ndf(theta_h: F64, params: Params) -> F64:
-    """D = α² / (π cos⁴ θh (α² + tan² θh)²), eq. 33, Walter 2007; written without the tangent, which has a pole."""
+    """D = α² / (π cos⁴ θh (α² + tan² θh)²), eq. 33, Walter 2007; written without the tangent, which has a pole.
+
+    With the "slope_variance" σ² of normals within a pixel, their distribution is convolved with it.
+    """
     alpha2 = roughness_to_alpha(params["roughness"]) ** 2
     cos2 = np.cos(theta_h) ** 2
     sin2 = np.sin(theta_h) ** 2
+    variance = params.get("slope_variance", 0.0)
+    if variance > 0:
+        return _convolved(alpha2, 2 * variance, sin2, np.maximum(cos2, _MIN_COS2))
     return np.asarray(alpha2 / (math.pi * np.square(alpha2 * cos2 + sin2)))
 
 
+def _convolved(alpha2: float, added: float, sin2: F64, cos2: F64) -> F64:
+    """GGX convolved with a Gaussian of slopes of the variance `added` / 2 along each axis.
+
+    Slopes of GGX are a mixture of Gaussians: with E distributed as e^−E,
+
+        P(t) = α² / (π (α² + t²)²) = ⟨ e^(−t²/v) / (π v) ⟩,   v = α² / E,
+
+    so that v + `added` replaces v. The mean is by the trapezoidal rule in ln E.
+    """
+    log_e = np.linspace(_LOG_E[0], _LOG_E[1], _NUM_NODES)
+    weights = np.exp(log_e - np.exp(log_e)) * (log_e[1] - log_e[0])
+    total, slope2 = np.zeros_like(sin2), sin2 / cos2
+    for width, weight in zip(alpha2 * np.exp(-log_e) + added, weights, strict=True):
+        total += weight / (math.pi * width) * np.exp(-slope2 / width)
+    return np.asarray(total / np.square(cos2))
+
+
 def masking(theta: F64, params: Params) -> F64:
-    """G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; written without the tangent, which has a pole."""
-    alpha2 = roughness_to_alpha(params["roughness"]) ** 2
+    """G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; written without the tangent, which has a pole.
+
+    Normals that vary mask one another like facets: α² + 2 σ² with their "slope_variance" σ².
+    """
+    alpha2 = roughness_to_alpha(params["roughness"]) ** 2 + 2 * params.get("slope_variance", 0.0)
     cos = np.cos(theta)
     return np.asarray(2.0 * cos / (cos + np.sqrt(cos * cos + alpha2 * np.sin(theta) ** 2)))
 
@@ -70,4 +98,5 @@ GGX = Term(
     texture="specular",
     help="The highlight of glTF materials, with a long soft tail.",
     width=("roughness", 1),
+    convolves_slopes=True,
 )

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.lobe_sampling import LobeSampling, lobe_curve, sample_lobe
+from relume.brdf.lobe_sampling import LobeSampling, lobe_curves, sample_lobe
 from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.specular import specular_albedo
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -109,9 +109,8 @@ class LiveTerm:
         return replace(image, traces_lobe=False) if changes_lobe and image.traces_lobe else image
 
     def changes_lobe(self, basis: EditBasis) -> bool:
-        """Return whether the curve that shapes the lobe is free in a basis."""
-        curve = lobe_curve(self.document["model"])
-        return curve is not None and curve.name in basis.affected_curves
+        """Return whether a curve that shapes the lobe is free in a basis."""
+        return any(curve.name in basis.affected_curves for curve in lobe_curves(self.document))
 
     def _lacks_lobe(self, image: DisplayedImage) -> bool:
         """Return whether an image does not trace the narrow lobe of the target."""

@@ -1,4 +1,4 @@
-"""Terms whose lobes are ray traced for each pixel: lobes narrower than what probes store."""
+"""Terms whose lobes are ray traced for each pixel: round lobes narrower than what probes store."""
 
 from __future__ import annotations
 
@@ -33,9 +33,15 @@ class TracedLobe(NamedTuple):
     albedo: Shaped[F32, "rows groups 3"]
 
 
+def _round_lobe(term: Mapping[str, Any]) -> LobeSampling | None:
+    """Return the distribution of rays of a term; None if its lobe is wide or anisotropic."""
+    sampling = sample_lobe(term, NO_LEVELS)
+    return sampling if sampling is not None and sampling.is_round else None
+
+
 def split_terms(terms: Terms) -> tuple[TracedLobe | None, Terms]:
     """Split the terms of a material into narrow ones, None for none, and the others. terms: of a complete look"""
-    samplings = [sample_lobe(term, NO_LEVELS) for term in terms]
+    samplings = list(map(_round_lobe, terms))
     narrow = [term for term, sampling in zip(terms, samplings, strict=True) if sampling is not None]
     if not narrow:
         return None, terms

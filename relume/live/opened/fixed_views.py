@@ -262,7 +262,7 @@ class BakedFixedViews:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
         pattern, images = self._lobe_tracer.pattern(lobe), tuple(material.images for material in light.reflectances)
         narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
-        key = digest((pattern.num_rays, pattern.quantile.tobytes(), narrow, images))
+        key = digest((pattern.num_rays, lobe.angles, lobe.axes, lobe.quantile.tobytes(), narrow, images))
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
         environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)

@@ -223,15 +223,21 @@ def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "step
 def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
     """Return the lobe of a material whose highlights are narrow and strong, and their terms; None for others."""
     lobes = (sample_lobe(document, NO_LEVELS) for document in reflectance.lobes)
-    narrow = next((lobe for lobe in lobes if lobe is not None), None)
+    # tangents are unknown at hits
+    narrow = next((lobe for lobe in lobes if lobe is not None and lobe.is_round), None)
     return None if narrow is None else (narrow, reflectance.lobes)
 
 
 def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
-    """Remove the gather rays of points whose light is traced along their lobe. rays: of `receivers`"""
-    is_traced = lobe.is_narrow[receivers.level if receivers.level is not None else 0]
-    gather_hits = np.where(np.reshape(is_traced, (-1, 1)), np.uint16(NO_PATCH), rays.gather_hits)
-    return replace(rays, gather_hits=gather_hits)
+    """Remove the gather rays of points whose light is traced along their lobe; neighbors do not share with them.
+
+    Args:
+        rays: of `receivers`, which have roughness levels. lobe: of the term.
+    """
+    is_broad = ~lobe.is_narrow[receivers.level]
+    gather_hits = np.where(is_broad[:, None], rays.gather_hits, np.uint16(NO_PATCH))
+    sharing = rays.sharing and rays.sharing._replace(highlights=rays.sharing.highlights.within(is_broad))
+    return replace(rays, gather_hits=gather_hits, sharing=sharing)
 
 
 def trace_lobes(

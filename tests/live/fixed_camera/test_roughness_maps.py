@@ -93,12 +93,13 @@ def test_the_picture_equals_the_reference_and_the_mean_roughness_does_not(scene,
 
 
 def test_samples_have_the_levels_of_the_map(direct) -> None:
-    ratios, level = direct.views["front"].roughness_levels(0)
+    pairs, level = direct.views["front"].roughness_levels(0)
+    ratios = [ratio for ratio, _ in pairs]
     assert 8 < len(ratios) <= 24
     assert np.all(np.diff(level.astype(int)) >= 0)
     assert 0.3 < np.array(ratios)[level].min() < 0.6
     assert 1.3 < np.array(ratios)[level].max() < 1.6
-    assert direct.views["front"].roughness_levels(1).ratios == ()
+    assert direct.views["front"].roughness_levels(1).pairs == ()
 
 
 @pytest.mark.parametrize("name", ["direct", pytest.param("gather", marks=pytest.mark.slow)])

@@ -62,7 +62,8 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
 def _traces_lobe(target: TermTarget, light: Illumination) -> bool:
     """Return whether few rays along the narrow lobe of a term show it: an operator would show noise."""
     live, shader = target.live, target.images.transfer.few_lobe_rays
-    return live.lobe is not None and not live.levels.ratios and shader.is_prepared(light)
+    is_round = live.lobe is not None and live.lobe.is_round
+    return is_round and not live.levels.pairs and shader.is_prepared(light)
 
 
 def _trace_lobe(target: TermTarget, light: Illumination) -> Shaped[NDArray[np.float32], "tiles 3 samples"]:
