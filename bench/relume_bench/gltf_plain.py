@@ -153,12 +153,12 @@ def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
     attributes["POSITION"] = (positions @ linear.T + to_world[:3, 3]).astype(np.float32)
     triangles = triangles[:, ::-1] if mirrored else triangles
     if "NORMAL" in attributes:
-        attributes["NORMAL"] = _unit(attributes["NORMAL"] @ np.linalg.inv(linear))
+        attributes["NORMAL"] = unit(attributes["NORMAL"] @ np.linalg.inv(linear))
     else:
         attributes, triangles = _make_flat(attributes, triangles)
     if "TANGENT" in attributes:
         along, handedness = (
-            _unit(attributes["TANGENT"][:, :3] @ linear.T),
+            unit(attributes["TANGENT"][:, :3] @ linear.T),
             attributes["TANGENT"][:, 3:] * (-1 if mirrored else 1),
         )
         attributes["TANGENT"] = np.concatenate([along, handedness], axis=1).astype(np.float32)
@@ -170,10 +170,16 @@ def _make_flat(attributes: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[d
     corners = faces.reshape(-1)
     corner_attributes = {name: values[corners] for name, values in attributes.items()}
     a, b, c = corner_attributes["POSITION"].reshape(-1, 3, 3).transpose(1, 0, 2)
-    corner_attributes["NORMAL"] = np.repeat(_unit(np.cross(b - a, c - a)), 3, axis=0)
+    corner_attributes["NORMAL"] = np.repeat(unit(np.cross(b - a, c - a)), 3, axis=0)
     return corner_attributes, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
 
 
-def _unit(vectors: NDArray[Any]) -> F32:
+def linear(display: F32) -> F32:
+    """Decode sRGB."""
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def unit(vectors: NDArray[Any]) -> F32:
+    """Normalize vectors, except those without length. (n, 3)"""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1), np.float32)

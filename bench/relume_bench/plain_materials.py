@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume_bench.gltf_plain import File
+from relume_bench.gltf_plain import File, linear
 
 F32 = NDArray[np.float32]
 Description = dict[str, Any]
@@ -99,7 +99,7 @@ class Materials:
         texels = np.ones((1, 1, len(np.atleast_1d(factor))), np.float32)
         if info is not None:
             image_values = np.asarray(self._file.image(info["index"])[..., channels] / np.float32(255), np.float32)
-            texels = _linear(image_values) if is_color else image_values
+            texels = linear(image_values) if is_color else image_values
         texels = texels * np.atleast_1d(np.asarray(factor, np.float32))
         bsdf[key] = self._image(f"{name}_{key}", texels, info)
         _set_uv_transform(bsdf, key, info)
@@ -127,13 +127,13 @@ class Materials:
             return {}
         info, texels = description.get("emissiveTexture"), np.ones((1, 1, 3), np.float32)
         if info is not None:
-            texels = _linear(np.asarray(self._file.image(info["index"])[..., :3] / np.float32(255), np.float32))
+            texels = linear(np.asarray(self._file.image(info["index"])[..., :3] / np.float32(255), np.float32))
         if not texels.any():
             return {}
         return {"emitter": {"type": "area", "radiance": self._image(f"{name}_emission", texels * factor, info)}}
 
     def _glass(self, description: Description, pbr: Description, transmission: float) -> Description:
-        volume, ior = _extension(description, "volume"), _extension(description, "ior").get("ior", 1.5)
+        volume, ior = _extension(description, "volume"), float(_extension(description, "ior").get("ior", 1.5))
         tint = {"type": "rgb", "value": [transmission * c for c in pbr.get("baseColorFactor", [1, 1, 1, 1])[:3]]}
         if not volume.get("thicknessFactor", 0):
             return {"type": "thindielectric", "int_ior": ior, "specular_transmittance": tint}
@@ -163,10 +163,6 @@ def _set_uv_transform(bsdf: Description, key: str, info: Description | None) -> 
     (x, y), (u, v) = uv_transform.get("offset", [0, 0]), uv_transform.get("scale", [1, 1])
     rows = [[c * u, s * v, x], [-s * u, c * v, y]]
     bsdf |= {f"{key}_{row}{column}": float(rows[row][column]) for row in range(2) for column in range(3)}
-
-
-def _linear(display: F32) -> F32:
-    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def _finer(texels: F32, times: int) -> F32:
