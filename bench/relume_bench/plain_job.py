@@ -45,6 +45,7 @@ def make_job(file: File) -> tuple[dict[str, Any], dict[str, Any]]:
         bsdfs.append(materials.bsdf(shape.material, attributes))
     job = {
         "integrator": {"type": "volpath", "max_depth": _DEPTH, "rr_depth": _RR_DEPTH}, "bsdfs": bsdfs,
+        "sampler": "multijitter",
         "emitters": [emitter for attributes, to_world in file.lights for emitter in _emitter(attributes, to_world)],
     }  # fmt: skip
     return {**arrays, **materials.arrays}, job
