@@ -108,9 +108,19 @@ class _Textured(NamedTuple):
 
     @classmethod
     def sample(
-        cls, face_points: FacePoints, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32
+        cls,
+        face_points: FacePoints,
+        materials: Sequence[Material],
+        material: NDArray[np.integer],
+        axes: Shaped[F32, "n 2 2"],
+        footprint: F32,
     ) -> _Textured:
-        """Look up textures. material: index, −1 for none. (n,) footprint: footprint of a pixel in UV space. (n,)"""
+        """Look up textures.
+
+        Args:
+            material: index, −1 for none. (n,)
+            axes: sides of the pixels' footprints in UV space. footprint: sides of squares of the same area. (n,)
+        """
         channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
         channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
         length, normal = np.ones(len(face_points.uv), np.float32), face_points.normal
@@ -120,12 +130,11 @@ class _Textured(NamedTuple):
                 continue
             for name, out in channels.items():
                 if name in scene_material.textures:
-                    out[rows] = MipMap.for_texture(scene_material.textures[name]).sample(
-                        face_points.uv[rows], footprint[rows]
-                    )
+                    pyramid = MipMap.for_texture(scene_material.textures[name])
+                    out[rows] = pyramid.sample_pixels(face_points.uv[rows], axes[rows])
             if scene_material.normal_map is not None:
                 pyramid = MipMap.for_texture(scene_material.normal_map)
-                mapped = pyramid.sample(face_points.uv[rows], footprint[rows])
+                mapped = pyramid.sample_pixels(face_points.uv[rows], axes[rows])
                 length[rows] = visible_length(mapped, pyramid.texels(footprint[rows]))
                 if (material_roughness := base_roughness(scene_material)) is not None:
                     channels["roughness"][rows, 0] = rougher(
@@ -148,11 +157,12 @@ def _interpolate_range(
     """Interpolate a range of `surface_at`: position, normal, tangent, and the textures of `SurfaceInteraction`."""
     face_points = FacePoints.from_hits(geometry, hits, directions)
     is_hit, distance = face_points.is_hit, np.where(face_points.is_hit, hits.distance, 1.0)
-    footprint = (
-        face_points.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(is_hit), np.float32)
-    )
+    footprint, axes = np.zeros(len(is_hit), np.float32), np.zeros((len(is_hit), 2, 2), np.float32)
+    if materials:
+        footprint = face_points.footprint(distance, directions, pixel_angle)
+        axes = face_points.pixel_axes(distance, directions, pixel_angle)
     material = np.where(is_hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
-    channels, length, mapped = _Textured.sample(face_points, materials, material, footprint)
+    channels, length, mapped = _Textured.sample(face_points, materials, material, axes, footprint)
     normal = flip_to_viewer(mapped, directions)
     tangent = project_to_tangent(face_points.tangents[:, :3], normal)
     uv_frame = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
