@@ -9,7 +9,7 @@ removed (its upper bound if it is below the noise), bias, HDR-FLIP, and the 99th
 values. `flip_with_noise` is HDR-FLIP against the mean of Mitsuba's passes; see `relume_bench.hdr_flip.without_noise`.
 
 Images are stored in the user's cache, in `assets` and `peers`, for each version of relume and of the peer's scripts: a
-run that was stopped goes on where it was. A file that fails is listed with its error.
+run that was stopped goes on where it was. A file that fails is listed with its error: docs/accuracy-assets.md.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -91,8 +92,7 @@ def summarize(results: Mapping[str, Mapping[str, Any]], tiny: bool) -> list[Figu
     """The figures of the results of files by name."""
     sizes, measured = Sizes.choose(tiny), [result for result in results.values() if "error" not in result]
     context = {
-        "files": len(measured),
-        "failed": {name: result["error"] for name, result in results.items() if "error" in result},
+        "files": len(measured), "failed": len(results) - len(measured),
         "size": list(sizes.size), "lights": sizes.lights, "spp": sizes.passes * sizes.spp,
     }  # fmt: skip
     figures = []
@@ -103,7 +103,10 @@ def summarize(results: Mapping[str, Mapping[str, Any]], tiny: bool) -> list[Figu
             Figure(f"assets.{key}_median", middle, unit, context),
             Figure(f"assets.{key}_p90", high, unit, context),
         ]
-    return figures
+    by_file = {
+        name: {key: value for key, value in result.items() if key != "pictures"} for name, result in results.items()
+    }
+    return [replace(figures[0], context={**context, "by_file": by_file}), *figures[1:]]
 
 
 class Pictures(NamedTuple):

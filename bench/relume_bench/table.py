@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from relume_bench import asset_table
+
 # an installed package has no pages
 DOCS = next((folder for folder in Path(__file__).resolve().parents if (folder / "docs").is_dir()), Path()) / "docs"
 BEGIN, END = "<!-- figures, written by relume_bench.table -->", "<!-- end of figures -->"
@@ -309,6 +311,7 @@ def main() -> int:
         lines = ",".join("\n" + json.dumps(figure, ensure_ascii=False) for figure in figures)
         file.write_text(f"[{lines}\n]\n")
         page.write_text(filled(page.read_text(), figures))
+        asset_table.fill_page(DOCS, figures)
     return 0
 
 
