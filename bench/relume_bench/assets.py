@@ -56,6 +56,7 @@ _UNIT, _FLIP_UNIT = "relative RMSE", "HDR-FLIP"
 ENVIRONMENTS = ("polyhaven_studio_small_03_1k", "polyhaven_venice_sunset_1k")
 SECOND = "second"
 _ORBIT = 40.0  # degrees from the first camera to the second, around the vertical through the middle of the scene
+_NOISE, _ROUNDS = 0.02, 8  # relative noise at which Mitsuba stops, and the most times that it renders its paths
 _FINER = 2  # pixels that are averaged along each side
 
 
@@ -93,7 +94,8 @@ def summarize(results: Mapping[str, Mapping[str, Any]], tiny: bool) -> list[Figu
     sizes, measured = Sizes.choose(tiny), [result for result in results.values() if "error" not in result]
     context = {
         "files": len(measured), "failed": len(results) - len(measured),
-        "size": list(sizes.size), "lights": sizes.lights, "spp": sizes.passes * sizes.spp,
+        "size": list(sizes.size), "lights": sizes.lights,
+        "least_spp": sizes.passes * sizes.spp, "most_spp": _ROUNDS * sizes.passes * sizes.spp,
     }  # fmt: skip
     figures = []
     for key, unit in (("rmse", _UNIT), ("flip", _FLIP_UNIT)):
@@ -200,7 +202,8 @@ def _render_mitsuba(path: Path, scene: Scene, shots: Sequence[tuple[str, str]], 
     cameras = {camera.name: camera for camera in scene.cameras}
     arrays, job = make_job(read_file(path))
     job |= {
-        "spp": [sizes.spp], "passes": sizes.passes, "size": list(sizes.size),
+        "spp": [sizes.spp], "passes": sizes.passes, "size": list(sizes.size), "noise": _NOISE, "rounds": _ROUNDS,
+        "most": sizes.spp,
         "shots": [
             {"camera": f"camera {view}", "yfov": cameras[view].yfov, "environment": environment}
             for environment, view in shots

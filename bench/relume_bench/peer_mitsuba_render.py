@@ -166,16 +166,26 @@ def passes(job: dict[str, Any], folder: Path) -> None:
 
     Args:
         job: its first "spp" is the count, and "passes" the number of images; "shots" are changes of the job, such as
-            another camera, each with its own images.
+            another camera, each with its own images. With "noise" and "rounds" the images are means of as many rounds
+            as make the relative noise of the mean image so small, and of so many at most.
         folder: for passes.npy, (passes, height, width, 3), with "shots" (shots, passes, height, width, 3), and
             result.json.
     """
-    pictures = []
-    for shot in job.get("shots", [{}]):
-        render = renderer(folder, {**job, **shot})
-        pictures.append([render(job["spp"][0], seed)[..., :3] for seed in range(job["passes"])])
+    pictures = [_quiet_passes({**job, **shot}, folder) for shot in job.get("shots", [{}])]
     np.save(folder / "passes.npy", np.array(pictures if "shots" in job else pictures[0], np.float32))
     (folder / "result.json").write_text(json.dumps({"version": mi.__version__}))
+
+
+def _quiet_passes(job: dict[str, Any], folder: Path) -> Any:
+    """Independent images of a job. (passes, height, width, 3)"""
+    render, num, total = renderer(folder, job), job["passes"], 0.0
+    for step in range(job.get("rounds", 1)):
+        total = total + np.array([render(job["spp"][0], num * step + k)[..., :3] for k in range(num)], np.float64)
+        mean = total.mean(axis=0)
+        noise = np.sqrt(((total - mean) ** 2).mean() / (num - 1) / (mean**2).mean())
+        if noise <= job.get("noise", 0):
+            break
+    return total / (step + 1)
 
 
 def main(folder: Path) -> None:
