@@ -55,7 +55,9 @@ _NAMES = ("assets.rmse_median", "assets.rmse_p90", "assets.flip_median", "assets
 _UNIT, _FLIP_UNIT = "relative RMSE", "HDR-FLIP"
 ENVIRONMENTS = ("polyhaven_studio_small_03_1k", "polyhaven_venice_sunset_1k")
 SECOND = "second"
-_ORBIT = 40.0  # degrees from the first camera to the second, around the vertical through the middle of the scene
+# degrees from the first camera to the second, around the vertical through what it looks at; less within a room, whose
+# walls are near
+_ORBIT, _ORBIT_INSIDE = 40.0, 10.0
 _NOISE, _ROUNDS = 0.02, 8  # relative noise at which Mitsuba stops, and the most times that it renders its paths
 _FINER = 2  # pixels that are averaged along each side
 
@@ -148,12 +150,13 @@ def render_file(path: Path, tiny: bool) -> dict[str, Pictures]:
 
 
 def orbited(scene: Scene) -> Camera:
-    """The second camera: the first, moved around the vertical through the point that it looks at."""
+    """The second camera: the first, moved around the vertical through the depth of the scene's middle."""
     camera, points = scene.cameras[0], np.concatenate([mesh.positions for mesh in scene.meshes])
-    center = (points.min(axis=0) + points.max(axis=0)) / 2
-    position, backward = camera.to_world[:3, 3], camera.to_world[:3, 2]
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, position, backward = (low + high) / 2, camera.to_world[:3, 3], camera.to_world[:3, 2]
+    is_inside = bool(((position > low) & (position < high)).all())
     pivot = position - backward * max(0.0, float((position - center) @ backward))
-    angle = np.radians(_ORBIT)
+    angle = np.radians(_ORBIT_INSIDE if is_inside else _ORBIT)
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     to_world = camera.to_world.copy()
     to_world[:3, :3], to_world[:3, 3] = turn @ camera.to_world[:3, :3], pivot + turn @ (position - pivot)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume_bench.gltf_plain import File, read_plain
+from relume_bench.gltf_plain import File, Shape, read_plain
 from relume_bench.mesh_plain import read_obj, read_ply
 from relume_bench.plain_materials import Materials
 
@@ -16,6 +16,7 @@ F64 = NDArray[np.float64]
 
 _DEPTH = 24
 _RR_DEPTH = 8  # russian roulette from this depth
+_GAP = 1e-4  # between the sides of a luminous surface, of its size
 _CANDELA = 1 / 683  # W/sr, as in importers
 
 
@@ -27,7 +28,8 @@ def read_file(path: Path) -> File:
 def make_job(file: File) -> tuple[dict[str, Any], dict[str, Any]]:
     """Arrays and job of a file, without cameras, environments and counts."""
     materials, arrays, bsdfs = Materials(file), dict[str, Any](), []
-    for k, shape in enumerate(file.shapes):
+    shapes = [side for shape in file.shapes for side in _luminous_sides(file, shape)]
+    for k, shape in enumerate(shapes):
         attributes, num = shape.attributes, len(shape.attributes["POSITION"])
         arrays |= {
             f"positions_{k}": attributes["POSITION"],
@@ -49,6 +51,21 @@ def make_job(file: File) -> tuple[dict[str, Any], dict[str, Any]]:
         "emitters": [emitter for attributes, to_world in file.lights for emitter in _emitter(attributes, to_world)],
     }  # fmt: skip
     return {**arrays, **materials.arrays}, job
+
+
+def _luminous_sides(file: File, shape: Shape) -> list[Shape]:
+    """The surface; if both sides of it shine, two that face apart, because the peer's emitters have one side."""
+    description = {} if shape.material is None else file.json["materials"][shape.material]
+    if not (description.get("doubleSided") and any(description.get("emissiveFactor", [0]))):
+        return [shape]
+    sides = []
+    for sign in (1, -1):
+        attributes = {**shape.attributes, "NORMAL": sign * shape.attributes["NORMAL"]}
+        extent = np.ptp(attributes["POSITION"], axis=0).max()
+        attributes["POSITION"] = attributes["POSITION"] + np.float32(_GAP * extent) * attributes["NORMAL"]
+        faces = shape.faces if sign > 0 else np.ascontiguousarray(shape.faces[:, ::-1])
+        sides.append(Shape(attributes, faces, shape.material))
+    return sides
 
 
 def _emitter(light: dict[str, Any], to_world: F64) -> list[dict[str, Any]]:

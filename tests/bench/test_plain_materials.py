@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relume_bench.gltf_plain import _TRIANGLES, File
+from relume_bench.gltf_plain import _TRIANGLES, File, Shape
+from relume_bench.plain_job import make_job
 from relume_bench.plain_materials import Materials
 
 
@@ -60,3 +61,18 @@ def test_partial_transmission_is_a_blend() -> None:
 )
 def test_primitives_are_triangles(mode: int, num: int, triangles: list) -> None:
     np.testing.assert_array_equal(_TRIANGLES[mode](np.arange(num, dtype=np.uint32)), triangles)
+
+
+@pytest.mark.parametrize(("two_sided", "glow", "num"), [(True, 1, 2), (False, 1, 1), (True, 0, 1)])
+def test_surfaces_that_shine_on_both_sides_are_two(two_sided: bool, glow: float, num: int) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    shape = Shape({"POSITION": corners, "NORMAL": np.tile(np.float32([0, 0, 1]), (3, 1))}, np.uint32([[0, 1, 2]]), 0)
+    material = {"doubleSided": two_sided, "emissiveFactor": [glow] * 3}
+    arrays, job = make_job(File({"materials": [material]}, Path(), [shape]))
+    assert len(job["bsdfs"]) == num
+    normals = [arrays[f"normals_{k}"][0, 2] for k in range(num)]
+    assert normals == [1, -1][:num]
+    for k, normal in enumerate(normals):
+        a, b, c = arrays[f"positions_{k}"][arrays[f"faces_{k}"][0]]
+        assert np.sign(np.cross(b - a, c - a)[2]) == normal
+        assert num == 1 or np.sign(a[2]) == normal
