@@ -21,8 +21,7 @@ def fill_page(docs: Path, figures: Iterable[Mapping[str, Any]]) -> None:
     Args:
         docs: folder of the pages. figures: entries of accuracy.json.
     """
-    by_file = next((f["context"].get("by_file", {}) for f in figures if f["name"] == "assets.rmse_median"), {})
-    if by_file:
+    for by_file in (f["context"]["by_file"] for f in figures if f["name"] == "assets.rmse_median"):
         page = docs / PAGE
         page.write_text(filled(page.read_text(encoding="utf-8"), by_file), encoding="utf-8")
 

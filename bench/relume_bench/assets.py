@@ -20,6 +20,7 @@ import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,26 +84,27 @@ def measure(tiny: bool) -> list[Figure]:
     """Two bakes and four pictures of each file."""
     if (why := missing()) is not None:
         return [*skipped(_NAMES[:2], _UNIT, why), *skipped(_NAMES[2:], _FLIP_UNIT, why)]
-    files = list(asset_files(shared_data()))
+    files = list(islice(asset_files(shared_data()), 1 if tiny else None))
     if not files:
         why = "the shared data is not there; bench/relume_bench/scenes.py describes its location"
         return [*skipped(_NAMES[:2], _UNIT, why), *skipped(_NAMES[2:], _FLIP_UNIT, why)]
-    results = {name: compared(path, tiny) for name, path in (files[:1] if tiny else files)}
-    return summarize(results, tiny)
+    return summarize({name: compared(path, tiny) for name, path in files}, tiny)
 
 
 def summarize(results: Mapping[str, Mapping[str, Any]], tiny: bool) -> list[Figure]:
-    """The figures of the results of files by name."""
+    """The figures of the results of files by name. Raises ValueError if all failed."""
     sizes, measured = Sizes.choose(tiny), [result for result in results.values() if "error" not in result]
+    if not measured:
+        raise ValueError(f"no file could be measured: {next(iter(results.values()))['error']}")
     context = {
-        "files": len(measured), "failed": len(results) - len(measured),
+        "files": len(measured), "files_that_failed": len(results) - len(measured),
         "size": list(sizes.size), "lights": sizes.lights,
         "least_spp": sizes.passes * sizes.spp, "most_spp": _ROUNDS * sizes.passes * sizes.spp,
     }  # fmt: skip
     figures = []
     for key, unit in (("rmse", _UNIT), ("flip", _FLIP_UNIT)):
         values = [result[key] for result in measured]
-        middle, high = (float(np.percentile(values, share)) if values else None for share in (50, 90))
+        middle, high = (float(np.percentile(values, share)) for share in (50, 90))
         figures += [
             Figure(f"assets.{key}_median", middle, unit, context),
             Figure(f"assets.{key}_p90", high, unit, context),

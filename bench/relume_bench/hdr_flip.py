@@ -112,7 +112,8 @@ def _lab(linear: F64) -> F64:
 
 def _hunt(lab: F64) -> F64:
     """Colors look less saturated when they are dark."""
-    return lab * np.concatenate([np.ones_like(lab[..., :1]), *[0.01 * lab[..., :1]] * 2], axis=-1)
+    saturation = 0.01 * lab[..., :1]
+    return np.asarray(lab * np.concatenate([np.ones_like(saturation), saturation, saturation], axis=-1))
 
 
 def _hyab(a: F64, b: F64) -> F64:

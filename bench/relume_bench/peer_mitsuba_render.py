@@ -178,7 +178,8 @@ def passes(job: dict[str, Any], folder: Path) -> None:
 
 def _quiet_passes(job: dict[str, Any], folder: Path) -> Any:
     """Independent images of a job. (passes, height, width, 3)"""
-    render, num, total = renderer(folder, job), job["passes"], 0.0
+    render, num = renderer(folder, job), job["passes"]
+    total: Any = 0.0
     for step in range(job.get("rounds", 1)):
         total = total + np.array([render(job["spp"][0], num * step + k)[..., :3] for k in range(num)], np.float64)
         mean = total.mean(axis=0)
