@@ -1,4 +1,4 @@
-"""Which files `relume_bench.assets` measures: by rule, so that none is chosen by hand.
+"""Files that `relume_bench.assets` measures: by rule, so that none is chosen by hand.
 
 Every .gltf, .glb, .obj and .ply file of the shared data that relume imports, except
 
@@ -24,9 +24,9 @@ _SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
 
 def asset_files(data: Path) -> Iterator[tuple[str, Path]]:
     """Names, relative to the folder of shared data, and paths of the files."""
-    seen = set()
+    stems = set()
     for path in _candidates(data):
-        if path.stem in seen:
+        if path.stem in stems:
             continue
         try:
             scene = import_scene(path, "asset")
@@ -36,7 +36,7 @@ def asset_files(data: Path) -> Iterator[tuple[str, Path]]:
         is_text = path.suffix.lower() in (".obj", ".ply")
         if num > MAX_TRIANGLES or (is_text and num < MIN_TRIANGLES):
             continue
-        seen.add(path.stem)
+        stems.add(path.stem)
         yield path.relative_to(data).as_posix(), path
 
 

@@ -66,7 +66,7 @@ _FINER = 2  # pixels that are averaged along each side
 FILE_VALUES = ("rmse", "bias", "flip", "flip_with_noise", "p99")  # of each picture; a file has their means
 
 
-class Sizes(NamedTuple):
+class AssetSizes(NamedTuple):
     """Width and height of images; lights of bakes; independent images of Mitsuba, and paths a pixel of each."""
 
     size: tuple[int, int]
@@ -75,7 +75,7 @@ class Sizes(NamedTuple):
     spp: int
 
     @classmethod
-    def choose(cls, tiny: bool) -> Sizes:
+    def choose(cls, tiny: bool) -> AssetSizes:
         """The measured sizes, or with `tiny` those of a trial run."""
         return cls((32, 24), 60, 2, 2) if tiny else cls((192, 144), 1000, 4, 64)
 
@@ -93,7 +93,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 def summarize(results: Mapping[str, Mapping[str, Any]], tiny: bool) -> list[Figure]:
     """The figures of the results of files by name. Raises ValueError if all failed."""
-    sizes, measured = Sizes.choose(tiny), [result for result in results.values() if "error" not in result]
+    sizes, measured = AssetSizes.choose(tiny), [result for result in results.values() if "error" not in result]
     if not measured:
         raise ValueError(f"no file could be measured: {next(iter(results.values()))['error']}")
     context = {
@@ -116,7 +116,7 @@ def summarize(results: Mapping[str, Mapping[str, Any]], tiny: bool) -> list[Figu
 
 
 class Pictures(NamedTuple):
-    """Of one shot: our image, (h, w, 3); the mask of its pixels on surfaces; Mitsuba's images, (passes, h, w, 3)."""
+    """One shot: our image, (h, w, 3); the mask of its pixels on surfaces; Mitsuba's images, (passes, h, w, 3)."""
 
     image: F64
     is_surface: NDArray[np.bool_]
@@ -141,7 +141,7 @@ def compared(path: Path, tiny: bool) -> dict[str, Any]:
 
 def render_file(path: Path, tiny: bool) -> dict[str, Pictures]:
     """The four pictures of a file by environment and camera. path, tiny: as for `compared`"""
-    scene, sizes = import_scene(path, path.stem), Sizes.choose(tiny)
+    scene, sizes = import_scene(path, path.stem), AssetSizes.choose(tiny)
     scene = with_cameras(scene, [orbited(scene)])
     views = (scene.cameras[0].name, SECOND)
     shots = [(environment, view) for environment in ENVIRONMENTS for view in views]
@@ -171,7 +171,7 @@ def _environment(name: str) -> Any:
 
 
 def _render_relume(
-    path: Path, scene: Scene, environment: str, views: Sequence[str], sizes: Sizes
+    path: Path, scene: Scene, environment: str, views: Sequence[str], sizes: AssetSizes
 ) -> Mapping[str, NDArray[Any]]:
     """Images of the views, and masks "is_surface"; stored for each version of relume."""
     key = digest((scene.id, environment, [camera.to_world.tolist() for camera in scene.cameras], sizes, _sources()))
@@ -202,7 +202,7 @@ def _sources() -> str:
     return digest([path.read_bytes() for path in sorted(folder.rglob("*.py"))])
 
 
-def _render_mitsuba(path: Path, scene: Scene, shots: Sequence[tuple[str, str]], sizes: Sizes) -> F32:
+def _render_mitsuba(path: Path, scene: Scene, shots: Sequence[tuple[str, str]], sizes: AssetSizes) -> F32:
     """Independent images of the shots. (shots, passes, height, width, 3)"""
     cameras = {camera.name: camera for camera in scene.cameras}
     arrays, job = make_job(read_file(path))

@@ -131,7 +131,7 @@ def _redistribute(distance: F64) -> F64:
 
 
 def _blur(opponents: F64) -> F64:
-    """Filter by the contrast sensitivity of the eye; each Gaussian of a sum is separable."""
+    """Filter by the contrast sensitivity of people; each Gaussian of a sum is separable."""
     widest = max(b for gaussians in _CONTRAST_SENSITIVITY for _, b in gaussians)
     radius = int(np.ceil(3 * np.sqrt(widest / (2 * np.pi**2)) * PIXELS_PER_DEGREE))
     x = np.arange(-radius, radius + 1) / PIXELS_PER_DEGREE

@@ -63,7 +63,7 @@ def read_obj(path: Path) -> File:
 
 def _corner(text: str, rows: dict[str, list[list[float]]]) -> tuple[int, int, int]:
     """Indices of position, UV and normal, from 0; -1 if missing."""
-    numbers = [int(part) if part else 0 for part in [*text.split("/"), "", ""][:3]]
+    numbers = [int(number) if number else 0 for number in [*text.split("/"), "", ""][:3]]
     counts = [len(rows[keyword]) for keyword in ("v", "vt", "vn")]
     a, b, c = (number + count if number < 0 else number - 1 for number, count in zip(numbers, counts, strict=True))
     return a, b, c
@@ -132,8 +132,8 @@ def read_ply(path: Path) -> File:
     def columns(*wanted: str) -> F64:
         return values[:, [names.index(name) for name in wanted]] if set(wanted) <= set(names) else np.zeros((0, 3))
 
-    place = next(k for k, kind in enumerate(elements["face"][1]) if kind[-1].startswith("vert"))
-    lists = [row[place] for row in polygons]
+    list_index = next(k for k, kind in enumerate(elements["face"][1]) if kind[-1].startswith("vert"))
+    lists = [row[list_index] for row in polygons]
     fans = [(p[0], p[k], p[k + 1]) for p in lists for k in range(1, len(p) - 1)]
     triangles, normals, colors = np.array(fans, np.int64), columns("nx", "ny", "nz"), None
     if "red" in names:

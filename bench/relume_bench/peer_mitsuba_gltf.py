@@ -26,7 +26,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
     """Metallic-roughness with specular, anisotropy, clearcoat and sheen; reflection only, the same on both sides.
 
     The side is that of the geometry. A shading normal that faces away from the viewer is bent just into view: otherwise
-    rims of coarse meshes and the far sides of bumps would be black, which they are in no photograph.
+    silhouettes of coarse meshes and the far sides of bumps would be black, although something is visible there.
 
     Properties: textures "base" (3), "rough" (1), "metal" (1), "weight" (1) and "tint" (3) of the specular lobe, "coat"
     (1), "coat_rough" (1), "sheen" (3), "normal" (3, unit, tangent space, halved and moved into [0, 1]); "colors",

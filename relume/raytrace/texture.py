@@ -77,8 +77,8 @@ class MipMap:
         out = np.zeros((len(uv), self.levels[0].shape[2]), np.float32)
         for counts in set(zip(along.tolist(), across.tolist(), strict=True)):
             rows = np.nonzero((along == counts[0]) & (across == counts[1]))[0]
-            for place in np.ndindex(counts):
-                i, j = (np.array(place) + 0.5) / counts - 0.5
+            for cell in np.ndindex(counts):
+                i, j = (np.array(cell) + 0.5) / counts - 0.5
                 offset = (i * major[rows] + j * minor[rows]) / size
                 out[rows] += self.sample((uv[rows] + offset).astype(np.float32), side[rows]) / np.float32(
                     np.prod(counts)
