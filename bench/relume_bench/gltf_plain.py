@@ -1,6 +1,7 @@
 """Read a glTF file as plain arrays for a peer: an independent, short reader that reveals errors of the importer.
 
-Shares nothing with `relume.scene`. Triangle lists only; nothing is validated, the files are known.
+Shares nothing with `relume.scene`. Triangles only; nothing is validated, the files are known. Incomplete triangles and
+extensions that are not objects are left out.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import base64
 import io
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -118,7 +119,7 @@ def read_plain(path: Path) -> File:
         if "mesh" in node:
             primitives = file.json["meshes"][node["mesh"]]["primitives"]
             file.shapes.extend(
-                _shape(file, primitive, to_world) for primitive in primitives if primitive.get("mode", 4) == 4
+                _shape(file, primitive, to_world) for primitive in primitives if primitive.get("mode", 4) in _TRIANGLES
             )
     return file
 
@@ -148,21 +149,35 @@ def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
     attributes = {name: file.accessor(k).astype(np.float32) for name, k in primitive["attributes"].items()}
     positions, linear = attributes["POSITION"], to_world[:3, :3]
     faces = file.accessor(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
-    triangles = np.asarray(faces.reshape(-1, 3), np.uint32)
+    triangles = _TRIANGLES[primitive.get("mode", 4)](np.asarray(faces, np.uint32).reshape(-1))
     mirrored = np.linalg.det(linear) < 0
     attributes["POSITION"] = (positions @ linear.T + to_world[:3, 3]).astype(np.float32)
     triangles = triangles[:, ::-1] if mirrored else triangles
     if "NORMAL" in attributes:
-        attributes["NORMAL"] = _unit(attributes["NORMAL"] @ np.linalg.inv(linear))
+        attributes["NORMAL"] = unit(attributes["NORMAL"] @ np.linalg.inv(linear))
     else:
         attributes, triangles = _make_flat(attributes, triangles)
     if "TANGENT" in attributes:
         along, handedness = (
-            _unit(attributes["TANGENT"][:, :3] @ linear.T),
+            unit(attributes["TANGENT"][:, :3] @ linear.T),
             attributes["TANGENT"][:, 3:] * (-1 if mirrored else 1),
         )
         attributes["TANGENT"] = np.concatenate([along, handedness], axis=1).astype(np.float32)
     return Shape(attributes, np.ascontiguousarray(triangles), primitive.get("material"))
+
+
+def _strip(corners: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    triangles[1::2, :2] = triangles[1::2, 1::-1]
+    return triangles
+
+
+# triangles of a primitive's corners by its mode: a list, a strip, a fan
+_TRIANGLES: dict[int, Callable[[NDArray[np.uint32]], NDArray[np.uint32]]] = {
+    4: lambda corners: corners[: len(corners) // 3 * 3].reshape(-1, 3),
+    5: _strip,
+    6: lambda corners: np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1),
+}
 
 
 def _make_flat(attributes: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[dict[str, F32], NDArray[np.uint32]]:
@@ -170,10 +185,16 @@ def _make_flat(attributes: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[d
     corners = faces.reshape(-1)
     corner_attributes = {name: values[corners] for name, values in attributes.items()}
     a, b, c = corner_attributes["POSITION"].reshape(-1, 3, 3).transpose(1, 0, 2)
-    corner_attributes["NORMAL"] = np.repeat(_unit(np.cross(b - a, c - a)), 3, axis=0)
+    corner_attributes["NORMAL"] = np.repeat(unit(np.cross(b - a, c - a)), 3, axis=0)
     return corner_attributes, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
 
 
-def _unit(vectors: NDArray[Any]) -> F32:
+def linear(display: F32) -> F32:
+    """Decode sRGB."""
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def unit(vectors: NDArray[Any]) -> F32:
+    """Normalize vectors, except those without length. (n, 3)"""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1), np.float32)

@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -125,12 +125,22 @@ def cached_passes(
     Returns:
         (passes, height, width, 3).
     """
-    scripts = [Path(__file__).with_name(f"peer_mitsuba_{name}.py").read_bytes() for name in ("plugins", "render")]
-    cached = platformdirs.user_cache_path("relume") / "peers" / f"{digest((scene.id, size, job, scripts))}.npy"
+    return cache_passes((scene.id, size, job), lambda folder: render(scene, size, job, folder, images))
+
+
+def cache_passes(key: Any, make: Callable[[Path], Any], plugins: str = "plugins") -> F32:
+    """The passes that `make` renders into a folder; stored for each key and version of the peer's scripts.
+
+    Args:
+        key: everything that the images depend on, for `digest`. make: writes passes.npy into its folder.
+        plugins: peer_mitsuba_NAME.py that has the BSDFs.
+    """
+    scripts = [Path(__file__).with_name(f"peer_mitsuba_{name}.py").read_bytes() for name in (plugins, "render")]
+    cached = platformdirs.user_cache_path("relume") / "peers" / f"{digest((key, scripts))}.npy"
     if not cached.is_file():
         cached.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=cached.parent) as folder:
-            render(scene, size, job, Path(folder), images)
+            make(Path(folder))
             (Path(folder) / "passes.npy").replace(cached)
     return np.asarray(np.load(cached, allow_pickle=False), np.float32)
 
@@ -177,16 +187,26 @@ def render_arrays(
         scene: scene with the camera and the environment.
         size, job, folder: as for `render`.
     """
-    camera, llvm = scene.cameras[0], _llvm()
-    arrays_by_name: dict[str, Any] = {
-        "camera": camera.to_world,
-        "environment": map_for_mitsuba(scene.environment.radiance),
-    }
-    np.savez(folder / "scene.npz", allow_pickle=False, **{**arrays_by_name, **arrays})
-    whole = {"yfov": camera.yfov, "size": list(size), "most": _MAX_SPP_PER_PASS, **job}
-    (folder / "job.json").write_text(json.dumps(whole))
+    camera = scene.cameras[0]
+    view = {"camera": camera.to_world, "environment": map_for_mitsuba(scene.environment.radiance)}
+    return run_peer({**view, **arrays}, {"yfov": camera.yfov, "size": list(size), **job}, folder)
+
+
+def run_peer(arrays: Mapping[str, Any], job: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Render a job with the peer.
+
+    Args:
+        arrays: surfaces, images, cameras and environments: scene.npz of peer_mitsuba_render.py.
+        job: its job.json. folder: for exchanged files.
+    Returns:
+        Contents of result.json in `folder`.
+    Raises:
+        CalledProcessError: the peer failed.
+    """
+    np.savez(folder / "scene.npz", allow_pickle=False, **arrays)
+    (folder / "job.json").write_text(json.dumps({"most": _MAX_SPP_PER_PASS, **job}))
     script = Path(__file__).with_name("peer_mitsuba_render.py")
-    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(llvm)}
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(_llvm())}
     command = [str(_interpreter()), "-I", str(script), str(folder)]
     subprocess.run(command, env=environment, check=True, timeout=3600)
     result: dict[str, Any] = json.loads((folder / "result.json").read_text())

@@ -12,6 +12,7 @@ mi: Any = __import__("mitsuba")
 dr: Any = __import__("drjit")
 
 _LEAST_ALPHA = 1e-3
+_LEAST_FACING = 0.01  # cosine between a normal and the direction to the viewer
 
 
 class Texel(dict[str, Any]):
@@ -22,7 +23,10 @@ class Texel(dict[str, Any]):
 
 
 class _Gltf(mi.BSDF):  # type: ignore[misc]
-    """Metallic-roughness with specular, anisotropy, clearcoat and sheen; one-sided, reflection only.
+    """Metallic-roughness with specular, anisotropy, clearcoat and sheen; reflection only, the same on both sides.
+
+    The side is that of the geometry. A shading normal that faces away from the viewer is bent just into view: otherwise
+    silhouettes of coarse meshes and the far sides of bumps would be black, although something is visible there.
 
     Properties: textures "base" (3), "rough" (1), "metal" (1), "weight" (1) and "tint" (3) of the specular lobe, "coat"
     (1), "coat_rough" (1), "sheen" (3), "normal" (3, unit, tangent space, halved and moved into [0, 1]); "colors",
@@ -36,7 +40,8 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         given = {name: props[name] for name in property_names}
         self.textures = {name: value for name, value in given.items() if isinstance(value, mi.Texture)}
         self.numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
-        flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.SpatiallyVarying
+        sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        flags = mi.BSDFFlags.GlossyReflection | sides | mi.BSDFFlags.SpatiallyVarying
         self.m_components, self.m_flags = [flags], flags
         self.sheen_table = None
         if "sheen_alpha" in self.numbers:
@@ -76,17 +81,25 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
             along, down = self._towards_texels(si)
             handedness = dr.sign(dr.dot(dr.cross(si.sh_frame.n, along), -down))
         along = si.to_local(along)
-        up = mi.Vector3f(0, 0, 1)
+        up = mi.Vector3f(0, 0, dr.select(self._outward(si).z >= 0, mi.Float(1), mi.Float(-1)))
         along = dr.normalize(mi.Vector3f(along.x, along.y, 0) + mi.Vector3f(1e-9, 0, 0))
-        bitangent = dr.cross(up, along) * handedness
+        bitangent = dr.cross(mi.Vector3f(0, 0, 1), along) * handedness
         normal = up
         if "normal" in self.textures:
             bump = mi.Vector3f(self._texture("normal", si, active, 3)) * 2 - 1
             normal = dr.normalize(bump.x * along + bump.y * bitangent + bump.z * up)
+        deficit = dr.maximum(_LEAST_FACING - dr.dot(normal, si.wi), 0)
+        normal = dr.normalize(normal + deficit * si.wi)
         rotation = self.numbers.get("turn", 0.0)
         s = along * dr.cos(rotation) + bitangent * dr.sin(rotation)
         s = dr.normalize(s - normal * dr.dot(normal, s))
         return mi.Frame3f(s, dr.cross(normal, s), normal)
+
+    @staticmethod
+    def _outward(si: Any) -> Any:
+        """Normal of the face, on the viewer's side, in coordinates of the shading frame."""
+        normal = si.to_local(si.n)
+        return dr.select(dr.dot(normal, si.wi) >= 0, normal, -normal)
 
     def _towards_texels(self, si: Any) -> tuple[Any, Any]:
         """Directions of the normal map's u, and of its v, which points down."""
@@ -166,7 +179,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         wo = dr.select(sample1 < diffuse, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(wi, h))
         bs = mi.BSDFSample3f()
         bs.wo = t.frame.to_world(wo)
-        bs.pdf = dr.select(self._is_same_side(si.wi, wi, bs.wo, wo, active), self._density(t, wi, wo), 0)
+        bs.pdf = dr.select(self._is_same_side(si, wi, bs.wo, wo, active), self._density(t, wi, wo), 0)
         bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
         bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
         usable = bs.pdf > 1e-9
@@ -176,13 +189,12 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
     def _eval_and_pdf(self, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         t = self._at(si, active)
         bent_i, bent_o = t.frame.to_local(si.wi), t.frame.to_local(wo)
-        is_visible = self._is_same_side(si.wi, bent_i, wo, bent_o, active)
+        is_visible = self._is_same_side(si, bent_i, wo, bent_o, active)
         value = dr.select(is_visible, mi.Color3f(self._value(t, bent_i, bent_o)), 0)
         return value, dr.select(is_visible, self._density(t, bent_i, bent_o), 0)
 
-    @staticmethod
-    def _is_same_side(wi: Any, bent_i: Any, wo: Any, bent_o: Any, active: Any) -> Any:
-        return active & (wi.z > 0) & (bent_i.z > 0) & (wo.z > 0) & (bent_o.z > 0)
+    def _is_same_side(self, si: Any, bent_i: Any, wo: Any, bent_o: Any, active: Any) -> Any:
+        return active & (dr.dot(self._outward(si), wo) > 0) & (bent_i.z > 0) & (bent_o.z > 0)
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
         """Mitsuba's interface."""

@@ -83,7 +83,8 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
 
     Args:
         folder: folder of scene.npz.
-        job: content of job.json: size, "crop", sampler, camera, emitters, integrator, by default of direct light.
+        job: content of job.json: size, "crop", sampler, emitters, integrator, by default of direct light; "yfov", and
+            names of the arrays of the "camera" and the "environment", by default those.
         bsdfs: descriptions, one per mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
@@ -92,7 +93,7 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
         "type": "perspective",
         "fov": float(np.degrees(job["yfov"])),
         "fov_axis": "y",
-        "to_world": transform((arrays["camera"] @ np.diag([-1.0, 1.0, -1.0, 1.0])).tolist()),
+        "to_world": transform((arrays[job.get("camera", "camera")] @ np.diag([-1.0, 1.0, -1.0, 1.0])).tolist()),
         "film": {
             "type": "hdrfilm", "width": job["size"][0], "height": job["size"][1],
             "rfilter": {"type": "box"}, "pixel_format": "rgb", "component_format": "float32",
@@ -102,7 +103,7 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
     }  # fmt: skip
     environment = {
         "type": "envmap",
-        "bitmap": mi.Bitmap(arrays["environment"]),
+        "bitmap": mi.Bitmap(arrays[job.get("environment", "environment")]),
         "to_world": transform().rotate([0, 1, 0], 90),
     }
     integrator = job.get("integrator", {"type": "direct"})
@@ -160,23 +161,41 @@ def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) 
     (folder / "result.json").write_text(json.dumps({"steps": step_results, "version": mi.__version__}))
 
 
-def passes(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
+def passes(job: dict[str, Any], folder: Path) -> None:
     """Render independent images.
 
     Args:
-        render: from a sample count and a seed.
-        job: its first "spp" is the count, and "passes" the number of images.
-        folder: for passes.npy, (passes, height, width, 3), and result.json.
+        job: its first "spp" is the count, and "passes" the number of images; "shots" are changes of the job, such as
+            another camera, each with its own images. With "noise" and "rounds" the images are means of as many rounds
+            as make the relative noise of the mean image so small, and of so many at most.
+        folder: for passes.npy, (passes, height, width, 3), with "shots" (shots, passes, height, width, 3), and
+            result.json.
     """
-    pictures = [render(job["spp"][0], seed)[..., :3] for seed in range(job["passes"])]
-    np.save(folder / "passes.npy", np.array(pictures, np.float32))
+    pictures = [_quiet_passes({**job, **shot}, folder) for shot in job.get("shots", [{}])]
+    np.save(folder / "passes.npy", np.array(pictures if "shots" in job else pictures[0], np.float32))
     (folder / "result.json").write_text(json.dumps({"version": mi.__version__}))
+
+
+def _quiet_passes(job: dict[str, Any], folder: Path) -> Any:
+    """Independent images of a job. (passes, height, width, 3)"""
+    render, num = renderer(folder, job), job["passes"]
+    total: Any = 0.0
+    for step in range(job.get("rounds", 1)):
+        total = total + np.array([render(job["spp"][0], num * step + k)[..., :3] for k in range(num)], np.float64)
+        mean = total.mean(axis=0)
+        noise = np.sqrt(((total - mean) ** 2).mean() / (num - 1) / (mean**2).mean())
+        if noise <= job.get("noise", 0):
+            break
+    return total / (step + 1)
 
 
 def main(folder: Path) -> None:
     """Render the job of job.json."""
     job = json.loads((folder / "job.json").read_text())
-    (passes if "passes" in job else steps)(renderer(folder, job), job, folder)
+    if "passes" in job:
+        passes(job, folder)
+    else:
+        steps(renderer(folder, job), job, folder)
 
 
 if __name__ == "__main__":

@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume_bench.gltf_plain import File
+from relume_bench.gltf_plain import File, linear
 
 F32 = NDArray[np.float32]
 Description = dict[str, Any]
 
 _FINER = 4  # texels of an alpha mask per texel of the image
 _LEAST_SHEEN = 0.07**2
+_CLEAR, _LEAST_FROST = 0.1, 0.03  # roughness up to which glass is smooth; the least of frosted texels
+_LEAST_FROSTED_IOR = 1.01
 
 
 class Materials:
@@ -39,11 +41,9 @@ class Materials:
         """
         description = {} if number is None else self._file.json["materials"][number]
         pbr, name = description.get("pbrMetallicRoughness", {}), f"m{number}"
-        reflecting = self._reflecting(description, pbr, name, has)
-        transmission = _extension(description, "transmission").get("transmissionFactor", 0.0)
-        if transmission:
-            return self._glass(description, pbr, transmission)
-        whole: Description = {"type": "twosided", "front": reflecting}
+        whole = self._reflecting(description, pbr, name, has)
+        if (transmission := _extension(description, "transmission")).get("transmissionFactor", 0.0):
+            return self._transmitting(description, pbr, name, transmission, whole)
         if description.get("alphaMode", "OPAQUE") != "OPAQUE":
             whole = {"type": "mask", "opacity": self._opacity(description, pbr, name), "content": whole}
         return {**whole, "sides": True, **self._make_emitter(description, name)}
@@ -99,7 +99,7 @@ class Materials:
         texels = np.ones((1, 1, len(np.atleast_1d(factor))), np.float32)
         if info is not None:
             image_values = np.asarray(self._file.image(info["index"])[..., channels] / np.float32(255), np.float32)
-            texels = _linear(image_values) if is_color else image_values
+            texels = linear(image_values) if is_color else image_values
         texels = texels * np.atleast_1d(np.asarray(factor, np.float32))
         bsdf[key] = self._image(f"{name}_{key}", texels, info)
         _set_uv_transform(bsdf, key, info)
@@ -127,46 +127,75 @@ class Materials:
             return {}
         info, texels = description.get("emissiveTexture"), np.ones((1, 1, 3), np.float32)
         if info is not None:
-            texels = _linear(np.asarray(self._file.image(info["index"])[..., :3] / np.float32(255), np.float32))
+            texels = linear(np.asarray(self._file.image(info["index"])[..., :3] / np.float32(255), np.float32))
         if not texels.any():
             return {}
         return {"emitter": {"type": "area", "radiance": self._image(f"{name}_emission", texels * factor, info)}}
 
-    def _glass(self, description: Description, pbr: Description, transmission: float) -> Description:
-        volume, ior = _extension(description, "volume"), _extension(description, "ior").get("ior", 1.5)
-        tint = {"type": "rgb", "value": [transmission * c for c in pbr.get("baseColorFactor", [1, 1, 1, 1])[:3]]}
+    def _transmitting(
+        self, description: Description, pbr: Description, name: str, transmission: Description, opaque: Description
+    ) -> Description:
+        """Glass, or a blend of glass and the opaque material where less than all light is transmitted."""
+        glass, inside = self._glass(description, pbr, name)
+        share, info = transmission["transmissionFactor"], transmission.get("transmissionTexture")
+        if share == 1 and info is None:
+            return {**glass, **inside}
+        texels = np.full((1, 1, 1), share, np.float32)
+        if info is not None:
+            texels = texels * self._file.image(info["index"])[..., :1] / np.float32(255)
+        weight = self._image(f"{name}_transmission", texels, info)
+        return {"type": "blendbsdf", "weight": weight, "opaque": opaque, "other": glass, "sides": True, **inside}
+
+    def _glass(self, description: Description, pbr: Description, name: str) -> tuple[Description, Description]:
+        """A dielectric, thin or solid; and the medium inside it, empty if it is clear."""
+        volume, ior = _extension(description, "volume"), float(_extension(description, "ior").get("ior", 1.5))
+        base: Description = {}
+        factor = pbr.get("baseColorFactor", [1, 1, 1, 1])[:3]
+        self._add(base, name, "tint", pbr.get("baseColorTexture"), factor, slice(3), is_color=True)
+        glass = {"specular_transmittance": base["tint"], "int_ior": ior}
         if not volume.get("thicknessFactor", 0):
-            return {"type": "thindielectric", "int_ior": ior, "specular_transmittance": tint}
-        distance = volume.get("attenuationDistance", np.inf)
-        absorbed = -np.log(np.maximum(volume.get("attenuationColor", [1, 1, 1]), 1e-6)) / distance
-        max_absorption = float(max(*absorbed, 1e-9))
-        rate = {"type": "rgb", "value": (absorbed / max_absorption).tolist()}
-        inside = {"type": "homogeneous", "albedo": 0.0, "scale": max_absorption, "sigma_t": rate}
-        roughness = pbr.get("roughnessFactor", 1.0) if "metallicRoughnessTexture" not in pbr else 0.0
-        kind: Description = {"type": "dielectric"}
-        if roughness > 0.1:
-            kind = {"type": "roughdielectric", "distribution": "ggx", "alpha": roughness**2}
-        return {**kind, "int_ior": ior, "specular_transmittance": tint, "interior": inside}
+            return {"type": "thindielectric", **glass}, {}
+        glass |= self._frosting(pbr, name, ior)
+        absorbed = -np.log(np.maximum(volume.get("attenuationColor", [1, 1, 1]), 1e-6))
+        absorbed = absorbed / volume.get("attenuationDistance", np.inf)
+        if not absorbed.any():  # free paths in an empty medium are NaN
+            return glass, {}
+        rate = {"type": "rgb", "value": (absorbed / absorbed.max()).tolist()}
+        inside = {"type": "homogeneous", "albedo": 0.0, "scale": float(absorbed.max()), "sigma_t": rate}
+        return glass, {"interior": inside}
+
+    def _frosting(self, pbr: Description, name: str, ior: float) -> Description:
+        """The kind of dielectric: smooth, or rough with the roughness of the file."""
+        roughness: Description = {}
+        info, factor = pbr.get("metallicRoughnessTexture"), pbr.get("roughnessFactor", 1.0)
+        self._add(roughness, name, "rough", info, factor, slice(1, 2))
+        alpha = np.maximum(self.arrays[f"{name}_rough"] ** 2, _LEAST_FROST**2)
+        if alpha.max() <= _CLEAR**2:
+            return {"type": "dielectric"}
+        texture = self._image(f"{name}_frost", alpha, info)
+        # its half vectors are undefined at an index of 1
+        return {
+            "type": "roughdielectric",
+            "distribution": "ggx",
+            "alpha": texture,
+            "int_ior": max(ior, _LEAST_FROSTED_IOR),
+        }
 
 
 def _extension(description: Description, kind: str) -> Description:
-    extension: Description = description.get("extensions", {}).get(f"KHR_materials_{kind}", {})
-    return extension
+    extension = description.get("extensions", {}).get(f"KHR_materials_{kind}", {})
+    return extension if isinstance(extension, dict) else {}
 
 
 def _set_uv_transform(bsdf: Description, key: str, info: Description | None) -> None:
     """Set the UV transform of KHR_texture_transform: translation · rotation · scale, v down."""
     uv_transform = (info or {}).get("extensions", {}).get("KHR_texture_transform")
-    if uv_transform is None:
+    if not isinstance(uv_transform, dict):
         return
     c, s = np.cos(uv_transform.get("rotation", 0.0)), np.sin(uv_transform.get("rotation", 0.0))
     (x, y), (u, v) = uv_transform.get("offset", [0, 0]), uv_transform.get("scale", [1, 1])
     rows = [[c * u, s * v, x], [-s * u, c * v, y]]
     bsdf |= {f"{key}_{row}{column}": float(rows[row][column]) for row in range(2) for column in range(3)}
-
-
-def _linear(display: F32) -> F32:
-    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def _finer(texels: F32, times: int) -> F32:

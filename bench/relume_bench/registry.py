@@ -213,7 +213,10 @@ GROUPS = (
     ),
     Group("relume_bench.glass", ("glass.rmse", "glass.rmse_frosted")),
     Group("relume_bench.roughness_maps", ("roughness.rmse",)),
-    Group("relume_bench.real_files", ("assets.rmse",)),
+    Group(
+        "relume_bench.assets",
+        ("assets.rmse_median", "assets.rmse_p90", "assets.flip_median", "assets.flip_p90"),
+    ),
     *(
         Group("relume_bench.sharp", (f"sharp.rmse_{r}", f"sharp.speckle_{r}"), arguments=("metal", r))
         for r in (0.02, 0.05, 0.1, 0.2, 0.3)

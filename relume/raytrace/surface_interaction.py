@@ -14,7 +14,7 @@ from relume.core.thread_pools import for_ranges
 from relume.raytrace.barycentric import FacePoints
 from relume.raytrace.camera_rays import Hits
 from relume.raytrace.scene_buffers import SceneBuffers
-from relume.raytrace.shading_normals import flip_to_viewer, footprint_sides, mapped_normal, mean_normal
+from relume.raytrace.shading_normals import flip_to_viewer, mapped_normal, mean_normal
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import project_to_tangent
 from relume.raytrace.texture import MipMap
@@ -111,14 +111,13 @@ class _Textured(NamedTuple):
         face_points: FacePoints,
         materials: Sequence[Material],
         material: NDArray[np.integer],
-        footprint: F32,
-        directions: F32,
+        axes: Shaped[F32, "n 2 2"],
     ) -> _Textured:
         """Look up textures.
 
         Args:
-            material: index, −1 for none. (n,) footprint: of a pixel in UV space. (n,)
-            directions: of the rays. (n, 3)
+            material: index, −1 for none. (n,)
+            axes: sides of the pixels' footprints in UV space.
         """
         channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
         channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
@@ -129,15 +128,10 @@ class _Textured(NamedTuple):
                 continue
             for name, out in channels.items():
                 if name in scene_material.textures:
-                    out[rows] = MipMap.for_texture(scene_material.textures[name]).sample(
-                        face_points.uv[rows], footprint[rows]
-                    )
+                    pyramid = MipMap.for_texture(scene_material.textures[name])
+                    out[rows] = pyramid.sample_pixels(face_points.uv[rows], axes[rows])
             if scene_material.normal_map is not None:
-                mapped, length[rows] = mean_normal(
-                    scene_material.normal_map,
-                    face_points.uv[rows],
-                    _footprint_sides(face_points, rows, footprint[rows], directions[rows]),
-                )
+                mapped, length[rows] = mean_normal(scene_material.normal_map, face_points.uv[rows], axes[rows])
                 normal = normal.copy() if normal is face_points.normal else normal
                 normal[rows] = mapped_normal(
                     mapped, normal[rows], face_points.tangents[rows], face_points.face_normal[rows]
@@ -155,11 +149,12 @@ def _interpolate_range(
     """Interpolate a range of `surface_at`: position, normal, tangent, and the textures of `SurfaceInteraction`."""
     face_points = FacePoints.from_hits(geometry, hits, directions)
     is_hit, distance = face_points.is_hit, np.where(face_points.is_hit, hits.distance, 1.0)
-    footprint = (
-        face_points.footprint(distance, directions, pixel_angle) if materials else np.zeros(len(is_hit), np.float32)
-    )
+    footprint, axes = np.zeros(len(is_hit), np.float32), np.zeros((len(is_hit), 2, 2), np.float32)
+    if materials:
+        footprint = face_points.footprint(distance, directions, pixel_angle)
+        axes = face_points.pixel_axes(distance, directions, pixel_angle)
     material = np.where(is_hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
-    channels, length, mapped = _Textured.sample(face_points, materials, material, footprint, directions)
+    channels, length, mapped = _Textured.sample(face_points, materials, material, axes)
     normal = flip_to_viewer(mapped, directions)
     tangent = project_to_tangent(face_points.tangents[:, :3], normal)
     uv_frame = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
@@ -183,17 +178,6 @@ def _interpolate_range(
         channels["emission"],
         face_points.normal.astype(np.float32, copy=False),
     )
-
-
-def _footprint_sides(face_points: FacePoints, rows: NDArray[np.intp], footprint: F32, directions: F32) -> F32:
-    """Sides of pixels in UV space at some points, see `footprint_sides`. (m, 2, 2)"""
-    normal, uv = face_points.normal[rows].astype(np.float32), face_points.uv[rows]
-    tangent = project_to_tangent(face_points.tangents[rows, :3], normal)
-    frame = _texture_frame(face_points.p[rows], face_points.uvs[rows], uv, normal, tangent)
-    frame[:, 2] = footprint
-    angle = frame[:, 3:4]
-    axis = np.asarray(np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent), np.float32)
-    return footprint_sides(frame.astype(np.float32), axis, normal, -directions)
 
 
 def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:

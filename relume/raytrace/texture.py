@@ -1,4 +1,4 @@
-"""Trilinear texture lookups in a MIP map."""
+"""Trilinear texture lookups in a MIP map, one or several in the footprint of a pixel."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from relume.scene.texture_encoding import ROWS_PER_BATCH, decode, periodic
 F32 = NDArray[np.float32]
 
 _LOOKUPS_PER_RANGE = 16_384
+_MAX_LOOKUPS = 8  # along a footprint
 _REPEAT, _, _CLAMP = range(len(WRAPS))  # wrap modes in kernels
 
 
@@ -56,6 +57,33 @@ class MipMap:
     def texels(self, footprint: Shaped[F32, " n"]) -> Shaped[F32, " n"]:
         """Convert the sides of filters from UV space to texels."""
         return np.asarray(footprint * max(self.levels[0].shape[:2]), np.float32)
+
+    def sample_pixels(self, uv: Shaped[F32, "n 2"], axes: Shaped[F32, "n sides=2 uv=2"]) -> Shaped[F32, "n channels"]:
+        """Look up means over pixels' footprints, by 2 × 2 to 2 × `_MAX_LOOKUPS` filtered values in each.
+
+        One filter as large as a footprint reaches more than a pixel beyond it, into what an atlas has beside it, and a
+        square one blurs across a long footprint.
+
+        Args:
+            uv: v from the top. axes: sides of the footprints, from `FacePoints.pixel_axes`.
+        """
+        height, width = self.levels[0].shape[:2]
+        size = np.array([width, height], np.float32)
+        major, minor = _ellipse_axes(axes * size)
+        length, breadth = np.linalg.norm(major, axis=1), np.linalg.norm(minor, axis=1)
+        across = np.where(breadth > 1, 2, 1)
+        along = np.clip(np.round(across * length / np.maximum(breadth, 1)), 1, _MAX_LOOKUPS).astype(np.int64)
+        side = np.sqrt(length / along * breadth / across) / max(height, width)
+        out = np.zeros((len(uv), self.levels[0].shape[2]), np.float32)
+        for counts in set(zip(along.tolist(), across.tolist(), strict=True)):
+            rows = np.nonzero((along == counts[0]) & (across == counts[1]))[0]
+            for cell in np.ndindex(counts):
+                i, j = (np.array(cell) + 0.5) / counts - 0.5
+                offset = (i * major[rows] + j * minor[rows]) / size
+                out[rows] += self.sample((uv[rows] + offset).astype(np.float32), side[rows]) / np.float32(
+                    np.prod(counts)
+                )
+        return out
 
     def sample(self, uv: Shaped[F32, "n 2"], footprint: Shaped[F32, " n"]) -> Shaped[F32, "n channels"]:
         """Look up filtered values.
@@ -101,6 +129,17 @@ def sample_image(texture: Texture, uv: Shaped[F32, "n uv"]) -> Shaped[F32, "n ch
 
     for_ranges(sample_range, len(uv), _LOOKUPS_PER_RANGE)
     return out
+
+
+def _ellipse_axes(sides: Shaped[F32, "n 2 2"]) -> tuple[Shaped[F32, "n 2"], Shaped[F32, "n 2"]]:
+    """The long and the short axis of the ellipse whose conjugate diameters are the sides of parallelograms."""
+    u, v = sides[..., 0], sides[..., 1]
+    uu, vv, uv = (u * u).sum(axis=1), (v * v).sum(axis=1), (u * v).sum(axis=1)
+    mean, half_difference = (uu + vv) / 2, np.hypot((uu - vv) / 2, uv)
+    angle = 0.5 * np.arctan2(2 * uv, uu - vv)
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    length, breadth = np.sqrt(mean + half_difference), np.sqrt(np.maximum(mean - half_difference, 0))
+    return length[:, None] * direction, breadth[:, None] * np.stack([-direction[:, 1], direction[:, 0]], axis=1)
 
 
 _pyramids: dict[int, MipMap] = {}

@@ -32,7 +32,7 @@ LONG = [
     "gather_incremental", "glass", "roughness_maps", "mirror", "probes", "probes_edits",
     "probes_reference", "canvas_free_camera", "btf", "btf_accuracy", "btf_speed", "load",
     "btf_edit", "many_sessions", "refusal", "slider_drag", "probes_static_view", "rotation",
-    "btf_several", "plan_disk", "probes_live", "probes_error", "real_files",
+    "btf_several", "plan_disk", "probes_live", "probes_error", "assets",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
     "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits",
 ]  # fmt: skip
@@ -45,7 +45,6 @@ ESTIMATES = (
     "gather.full_",
     "glass.",
     "roughness.",
-    "assets.",
     "mirror.",
     "sharp.rmse_",
     "sharp.static_rmse_",
