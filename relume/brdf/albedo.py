@@ -119,7 +119,7 @@ def material_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap 
 @lru_cache(maxsize=1)
 def _white_albedo() -> float:
     """First entry of F for a white diffuse term."""
-    white = {"model": "lambert", "color": [1.0] * 3, "params": {}, "curves": {}, "texture": None}
+    white: dict[str, Any] = {"model": "lambert", "color": [1.0] * 3, "params": {}, "curves": {}, "texture": None}
     return float(reflectance_matrix(white)[0, 0])
 
 

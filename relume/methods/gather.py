@@ -100,8 +100,7 @@ class GatherMethod:
             + direct.num_view_samples * (2 * rays + 4 + -(-num_mirror_lights // 8))
             + patch_count * _PATCH_BYTES
             + num_points * bits
-            + plan_estimates.texture_bytes(scene)
-            + plan_estimates.corner_bytes(scene),
+            + plan_estimates.texture_bytes(scene),
             peak_bytes=direct.peak_bytes
             + plan_estimates.texture_bytes(scene)
             + patch_count * _PATCH_BUILD_BYTES

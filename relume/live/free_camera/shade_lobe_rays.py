@@ -25,8 +25,9 @@ from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.shade_pixels import blend, interpolate_uv, perturbed_normal, texture_footprint
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
-from relume.probes.stored_scene import NORMAL_MAP, StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.surface_textures import NORMAL_MAP
 from relume.raytrace.texture_kernels import sample_texture
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene

@@ -139,8 +139,8 @@ def lobe_radiance(
     is_traced = image.is_first & ((x * _STEP_X + y * _STEP_Y) % 1.0 < rays_per_point)
     traced = np.flatnonzero(is_traced) if image.is_first.any() else np.arange(len(is_traced))
     radiance = np.zeros((len(is_traced), 3), np.float32)
-    traced_args = receivers.without_light(traced), footprint[traced], core, lobe_width
-    radiance[traced] = mean_lobe_radiance(*light_args, *traced_args, is_direct=is_direct)
+    points, sides = receivers.without_light(traced), footprint[traced]
+    radiance[traced] = mean_lobe_radiance(*light_args, points, sides, core, lobe_width, is_direct=is_direct)
     if image.is_first.any():
         radiance = _share_with_neighbors(radiance, is_traced, image, receivers, footprint, lobe_width)
     if is_direct:

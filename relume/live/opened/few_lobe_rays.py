@@ -81,7 +81,7 @@ class FewLobeRays:
         image = self._image_points(view, material)
         footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
         light_args = self._scene(light), self.environment(light), receivers, footprint
-        rays_per_point = MAX_RAYS / max(np.count_nonzero(image.is_first), 1)
+        rays_per_point = MAX_RAYS / max(int(np.count_nonzero(image.is_first)), 1)
         ray_args = traced, image, rays_per_point, local_rays
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)
         cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo).clip(0, 1)

@@ -158,7 +158,7 @@ class LobeTracer:
             return NO_TEXTURES
         baked, coordinates = self._textures
         textures, geometry = replace_textures(baked, images), self._tracer.geometry
-        has_texture = (textures.material_textures[:, : len(TEXTURES)] >= 0).any(axis=1)
+        has_texture = np.asarray((textures.material_textures[:, : len(TEXTURES)] >= 0).any(axis=1))
         mesh_args = geometry.positions, geometry.faces, geometry.face_normals, has_texture[geometry.face_material]
         return hit_textures(textures, project_missing(coordinates, *mesh_args))
 

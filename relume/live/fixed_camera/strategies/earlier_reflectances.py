@@ -45,18 +45,16 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     reference = live.ready.reference
     assert reference is not None
     assert reference.light is not None
-    image, state = live.ready.image, {"fidelity": Fidelity.APPROXIMATE, "light": light}
-    is_changed = bool(reference.changed_curves(live.target_bands))
-    if is_changed and _traces_lobe(target, reference.light):
-        shaded = _trace_lobe(target, reference.light)
-        live.set_ready(replace(live.ready, image=shaded, bands=live.target_bands, traces_lobe=True, **state))
+    state = replace(live.ready, fidelity=Fidelity.APPROXIMATE, light=light)
+    if reference.changed_curves(live.target_bands) and _traces_lobe(target, reference.light):
+        image = _trace_lobe(target, reference.light)
+        live.set_ready(replace(state, image=image, bands=live.target_bands, traces_lobe=True))
         return
     steps = images.operator(material, live, reference)
     if steps is not None:
         reference = live.mark_lobe(operator.advance(reference, live.target_bands, steps, None))
-    np.copyto(image, reference.image)  # only the picture's own state refers to it
-    marks = {"bands": reference.bands, "reference": reference, "traces_lobe": reference.traces_lobe}
-    live.set_ready(replace(live.ready, image=image, **marks, **state))
+    np.copyto(state.image, reference.image)  # only the picture's own state refers to it
+    live.set_ready(replace(state, bands=reference.bands, reference=reference, traces_lobe=reference.traces_lobe))
 
 
 def _traces_lobe(target: TermTarget, light: Illumination) -> bool:
