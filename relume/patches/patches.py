@@ -48,7 +48,7 @@ class Patches:
     diffuse: Shaped[F32, "patches 3"]
     specular: Shaped[F32, "patches 3"]
     material: Shaped[NDArray[np.uint16], " patches"]
-    uv: Shaped[F32, "patches points 5"]
+    uv: Shaped[F32, "patches points uv"]
     surface_normal: Shaped[F32, "patches points 3"]
 
     @property

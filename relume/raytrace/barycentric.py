@@ -70,29 +70,35 @@ class FacePoints(NamedTuple):
         cosine = np.maximum(-np.einsum("nc,nc->n", self.face_normal, directions), 0.05)
         return np.asarray(distance * pixel_angle * np.sqrt(uv_area / np.maximum(self.twice_area, 1e-20) / cosine))
 
-    def pixel_axes(
+    def pixel_sides(
         self, distance: Shaped[F32, " n"], directions: Shaped[F32, "n 3"], pixel_angle: float
-    ) -> Shaped[F32, "n 2 2"]:
-        """Two sides of a pixel's footprint in texture space, of which the slanted one is longer on the surface.
+    ) -> Shaped[F32, "n 2 3"]:
+        """Two sides of a pixel's footprint on the surface, meters: across the view direction, and the longer along it.
 
         Args:
             distance, directions, pixel_angle: as for `footprint`.
-        Returns:
-            As rows of u and v; zero for a triangle without an area in the world.
+        """
+        slant = np.einsum("nc,nc->n", self.face_normal, directions)[:, None]
+        along_view = unit(directions - slant * self.face_normal, self.p[:, 1] - self.p[:, 0])
+        across_view = np.cross(self.face_normal, along_view)
+        side = distance[:, None] * pixel_angle
+        return np.stack([side * across_view, side / np.maximum(-slant, 0.05) * along_view], axis=1).astype(np.float32)
+
+    def texture_sides(self, sides: Shaped[F32, "n 2 3"]) -> Shaped[F32, "n 2 2"]:
+        """Sides of pixels' footprints in texture space, as rows of u and v; zero for a triangle without an area.
+
+        Args:
+            sides: from `pixel_sides`.
         """
         edges, uv_edges = self.p[:, 1:] - self.p[:, :1], self.uvs[:, 1:] - self.uvs[:, :1]
-        slant = np.einsum("nc,nc->n", self.face_normal, directions)[:, None]
-        along_view = unit(directions - slant * self.face_normal, edges[:, 0])
-        across_view = np.cross(self.face_normal, along_view)
         across_edges = np.cross(edges[:, 0], edges[:, 1])
         area_squared = np.maximum(np.einsum("nc,nc->n", across_edges, across_edges), 1e-30)[:, None]
-        side = distance[:, None] * pixel_angle
-        axes = np.empty((len(distance), 2, 2), np.float32)
-        for k, (axis, length) in enumerate(((across_view, side), (along_view, side / np.maximum(-slant, 0.05)))):
-            first = np.einsum("nc,nc->n", np.cross(axis, edges[:, 1]), across_edges)[:, None]
-            second = np.einsum("nc,nc->n", np.cross(edges[:, 0], axis), across_edges)[:, None]
-            axes[:, k] = length / area_squared * (first * uv_edges[:, 0] + second * uv_edges[:, 1])
-        return axes
+        out = np.empty((len(sides), 2, 2), np.float32)
+        for k in range(2):
+            first = np.einsum("nc,nc->n", np.cross(sides[:, k], edges[:, 1]), across_edges)[:, None]
+            second = np.einsum("nc,nc->n", np.cross(edges[:, 0], sides[:, k]), across_edges)[:, None]
+            out[:, k] = (first * uv_edges[:, 0] + second * uv_edges[:, 1]) / area_squared
+        return out
 
 
 def positions_on_faces(

@@ -12,7 +12,6 @@ from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
 
-_LEAST_COSINE = 0.05  # between normal and view direction, as for `FacePoints.footprint`
 _SIDE_SAMPLES = 4  # of normal maps, along each side of a pixel
 _UP = np.array([[0, 0, 1]], np.float32)
 MIN_FACING = 0.01  # minimum cosine between a shading normal and the direction to the viewer
@@ -27,24 +26,6 @@ def visible_length(mapped: Shaped[F32, "n 3"], texels: Shaped[F32, " n"]) -> Sha
     """
     coverage = np.clip(np.log2(np.maximum(texels, 1)), 0, 1)
     return np.asarray(1 - coverage * (1 - np.minimum(np.linalg.norm(mapped, axis=1), 1)), np.float32)
-
-
-def footprint_sides(
-    uv: Shaped[F32, "n 5"], texture_axis: Shaped[F32, "n 3"], normal: Shaped[F32, "n 3"], wo: Shaped[F32, "n 3"]
-) -> Shaped[F32, "n 2 2"]:
-    """Sides of a pixel's footprint in UV space, along and across the view direction; for textures without distortion.
-
-    Args:
-        uv: see `relume.raytrace.surface_interaction.SurfaceInteraction`. texture_axis: direction of u, unit.
-        normal: of the surface, unit. wo: toward the viewer, unit.
-    """
-    across = project_to_tangent(np.cross(normal, wo), normal)
-    sides = np.stack([across, np.cross(normal, across)], axis=1)
-    down = np.cross(normal, texture_axis) * -uv[:, 4:]
-    in_texture = np.einsum("nsc,nuc->nsu", sides, np.stack([texture_axis, down], axis=1))
-    stretch = np.sqrt(np.maximum(np.einsum("nc,nc->n", normal, wo), _LEAST_COSINE))[:, None]
-    lengths = uv[:, 2:3] * np.concatenate([stretch, 1 / stretch], axis=1)
-    return np.asarray(in_texture * lengths[..., None], np.float32)
 
 
 def mean_normal(

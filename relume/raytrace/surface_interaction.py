@@ -35,8 +35,8 @@ class SurfaceInteraction:
             indices.
         diffuse, specular: texture channels, 1 without a texture.
         uv: texture coordinates (u, v), side of the pixel's footprint in UV space, angle from the tangent to the u axis
-            in radians, −1 if the texture is mirrored, else 1. Triangles without UV coordinates use tri-planar mapping
-            in meters.
+            in radians, −1 if the texture is mirrored, else 1; then the two sides of that footprint, (u, v) each.
+            Triangles without UV coordinates use tri-planar mapping in meters.
         roughness: relative to the material's terms, 1 without a roughness map.
         normal_length: length of the mean normal in the pixel, 1 without a normal map.
         emission: relative to the mean of the material's surfaces, 1 without an emission texture.
@@ -46,7 +46,7 @@ class SurfaceInteraction:
     points: SurfacePoints
     diffuse: Shaped[F32, "n 3"]
     specular: Shaped[F32, "n 3"]
-    uv: Shaped[F32, "n 5"]
+    uv: Shaped[F32, "n 9"]
     roughness: Shaped[F32, " n"]
     normal_length: Shaped[F32, " n"]
     emission: Shaped[F32, "n 3"]
@@ -149,21 +149,22 @@ def _interpolate_range(
     """Interpolate a range of `surface_at`: position, normal, tangent, and the textures of `SurfaceInteraction`."""
     face_points = FacePoints.from_hits(geometry, hits, directions)
     is_hit, distance = face_points.is_hit, np.where(face_points.is_hit, hits.distance, 1.0)
+    sides = face_points.pixel_sides(distance, directions, pixel_angle)
     footprint, axes = np.zeros(len(is_hit), np.float32), np.zeros((len(is_hit), 2, 2), np.float32)
     if materials:
         footprint = face_points.footprint(distance, directions, pixel_angle)
-        axes = face_points.pixel_axes(distance, directions, pixel_angle)
+        axes = face_points.texture_sides(sides)
     material = np.where(is_hit, geometry.face_material[np.maximum(hits.face, 0)], -1)
     channels, length, mapped = _Textured.sample(face_points, materials, material, axes)
     normal = flip_to_viewer(mapped, directions)
     tangent = project_to_tangent(face_points.tangents[:, :3], normal)
-    uv_frame = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
-    uv_frame[:, 2] = footprint
+    uv_frame = np.empty((len(is_hit), 9))
+    uv_frame[:, :5] = _texture_frame(face_points.p, face_points.uvs, face_points.uv, normal, tangent)
+    uv_frame[:, 2], uv_frame[:, 5:] = footprint, axes.reshape(-1, 4)
     lacks_uv = uv_frame[:, 4] == 0
     if lacks_uv.any():
         flat_columns = (
-            column[lacks_uv]
-            for column in (face_points.position, face_points.face_normal, normal, tangent, distance * pixel_angle)
+            column[lacks_uv] for column in (face_points.position, face_points.face_normal, normal, tangent, sides)
         )
         uv_frame[lacks_uv] = _triplanar_frame(*flat_columns)
     return (
@@ -210,15 +211,17 @@ def triplanar_axes(
     return u_axis, np.cross(sign[:, None] * np.eye(3)[axis], u_axis)
 
 
-def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
+def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32, sides: F32) -> F32:
     """Texture coordinates of tri-planar mapping, one repeat per meter; see `SurfaceInteraction.uv`.
 
     Args:
         position, face_normal, normal, tangent: positions, face normals, normals and tangents of n points. (n, 3) each.
-        side: side length of a pixel there, meters. (n,)
+        sides: of the pixels there, meters. (n, 2, 3)
     """
     u_axis, v_axis = triplanar_axes(face_normal)
     u, v = np.einsum("nc,nc->n", position, u_axis), -np.einsum("nc,nc->n", position, v_axis)
     x = np.einsum("nc,nc->n", u_axis, tangent)
     y = np.einsum("nc,nc->n", u_axis, np.cross(normal, tangent))
-    return np.asarray(np.column_stack([u, v, side, np.arctan2(y, x), np.ones(len(u))]))
+    flat = np.einsum("nsc,nuc->nsu", sides, np.stack([u_axis, -v_axis], axis=1))
+    side, angle = np.linalg.norm(sides[:, 0], axis=1), np.arctan2(y, x)
+    return np.asarray(np.column_stack([u, v, side, angle, np.ones(len(u)), flat.reshape(-1, 4)]))

@@ -18,6 +18,7 @@ from relume.scene.texture_encoding import ROWS_PER_BATCH, decode, periodic
 
 F32 = NDArray[np.float32]
 
+_UV_COLUMNS = 9  # of `SurfaceInteraction.uv`
 _LOOKUPS_PER_RANGE = 16_384
 _MAX_LOOKUPS = 8  # along a footprint
 _REPEAT, _, _CLAMP = range(len(WRAPS))  # wrap modes in kernels
@@ -65,7 +66,7 @@ class MipMap:
         square one blurs across a long footprint.
 
         Args:
-            uv: v from the top. axes: sides of the footprints, from `FacePoints.pixel_axes`.
+            uv: v from the top. axes: sides of the footprints, from `FacePoints.texture_sides`.
         """
         height, width = self.levels[0].shape[:2]
         size = np.array([width, height], np.float32)
@@ -115,17 +116,27 @@ class MipMap:
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
 
 
+def footprint_sides(uv: Shaped[F32, "n uv"]) -> Shaped[F32, "n 2 2"]:
+    """Return the sides of pixels' footprints in UV space, as rows; of squares if only their size is known.
+
+    Args:
+        uv: as in `relume.raytrace.surface_interaction.SurfaceInteraction`; older stores lack the sides.
+    """
+    if uv.shape[1] >= _UV_COLUMNS:
+        return uv[:, 5:_UV_COLUMNS].reshape(-1, 2, 2)
+    return np.asarray(uv[:, 2, None, None] * np.eye(2, dtype=np.float32))
+
+
 def sample_image(texture: Texture, uv: Shaped[F32, "n uv"]) -> Shaped[F32, "n channels"]:
     """Look up a texture on all threads.
 
     Args:
-        texture: any. uv: u, v, and the side of the pixel's footprint, as in
-            `relume.raytrace.surface_interaction.SurfaceInteraction`; further columns are ignored.
+        texture: any. uv: as in `relume.raytrace.surface_interaction.SurfaceInteraction`; see `footprint_sides`.
     """
     pyramid, out = MipMap.for_texture(texture), np.empty((len(uv), texture.pixels.shape[2]), np.float32)
 
     def sample_range(start: int, stop: int) -> None:
-        out[start:stop] = pyramid.sample(uv[start:stop, :2], uv[start:stop, 2])
+        out[start:stop] = pyramid.sample_pixels(uv[start:stop, :2], footprint_sides(uv[start:stop]))
 
     for_ranges(sample_range, len(uv), _LOOKUPS_PER_RANGE)
     return out

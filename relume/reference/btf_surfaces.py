@@ -47,7 +47,7 @@ class BtfSurface:
 
 
 def sample_btf_surface(
-    texels: BtfRef, uv: Shaped[F32, "n 5"], wo: Shaped[F64, "n 3"], rng: np.random.Generator
+    texels: BtfRef, uv: Shaped[F32, "n uv"], wo: Shaped[F64, "n 3"], rng: np.random.Generator
 ) -> BtfSurface:
     """Look up the BTF at points.
 

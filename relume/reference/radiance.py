@@ -62,7 +62,7 @@ class ReferencePoints:
     wo: Shaped[F32, "n 3"]
     textures: Mapping[str, F32]
     roughness: Shaped[F32, " n"]
-    uv: Shaped[F32, "n 5"] | None = None
+    uv: Shaped[F32, "n uv"] | None = None
     alpha_sample: Shaped[F32, " #n"] = field(default_factory=lambda: FIXED_ALPHA_SAMPLE)
     slope_variance: Shaped[F32, " #n"] = field(default_factory=lambda: np.zeros(1, np.float32))
 

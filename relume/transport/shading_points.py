@@ -194,7 +194,7 @@ class ShadingPoints:
     wo: Shaped[F32, "n 3"]
     visible: Shaped[NDArray[np.uint8], "n bytes"]
     rays: Sequence[RayList] = ()
-    uv: Shaped[F32, "n 5"] | None = None
+    uv: Shaped[F32, "n uv"] | None = None
     level: Shaped[NDArray[np.uint8], " n"] | None = None
 
     @property

@@ -67,7 +67,7 @@ def _from_listed(grid, axes, first, wi, irradiance, out):  # type: ignore[no-unt
                     out[p, channel, index[k]] += scale * weight[k] * irradiance[channel, ray]
 
 
-def texture_axes(rotation: float, uv: Shaped[F32, "n 5"]) -> Shaped[F32, "n 4"]:
+def texture_axes(rotation: float, uv: Shaped[F32, "n uv"]) -> Shaped[F32, "n 4"]:
     """Return the axes of a texture in the shading frames of points, for `to_texture_frame`.
 
     Args:
@@ -75,7 +75,7 @@ def texture_axes(rotation: float, uv: Shaped[F32, "n 5"]) -> Shaped[F32, "n 4"]:
     """
     cosine, sine = math.cos(rotation), math.sin(rotation)
     x = np.stack([np.cos(uv[:, 3]), np.sin(uv[:, 3])], axis=1)
-    y = uv[:, 4:] * np.stack([-x[:, 1], x[:, 0]], axis=1)
+    y = uv[:, 4:5] * np.stack([-x[:, 1], x[:, 0]], axis=1)
     axes = np.concatenate([cosine * x + sine * y, cosine * y - sine * x], axis=1)
     return np.asarray(axes, np.float32)
 

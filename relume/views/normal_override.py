@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from relume.brdf.texture_slots import NormalMap
 from relume.core.errors import StoreError
 from relume.images.image_store import load_normal_map
-from relume.raytrace.shading_normals import flip_to_viewer, footprint_sides, mapped_normal, mean_normal
+from relume.raytrace.shading_normals import flip_to_viewer, mapped_normal, mean_normal
 from relume.raytrace.tangents import project_to_tangent, rotation_between
+from relume.raytrace.texture import footprint_sides
 from relume.views.store_io import read_ray_origins, read_surface_normal, read_uv, view_directions
 from relume.views.view import View
 
@@ -33,7 +34,7 @@ class PerturbedNormals(NamedTuple):
 
     normal: Shaped[F32, "n 3"]
     tangent: Shaped[F32, "n 3"]
-    uv: Shaped[F32, "n 5"]
+    uv: Shaped[F32, "n uv"]
     normal_length: Shaped[F32, " n"]
     baked_normal: Shaped[F32, "n 3"]
 
@@ -67,7 +68,7 @@ def perturbed(view: View, material: int, map_: NormalMap) -> PerturbedNormals:
 
 def perturb_normals(
     map_: NormalMap,
-    uv: Shaped[F32, "n 5"],
+    uv: Shaped[F32, "n uv"],
     smooth: Shaped[F32, "n 3"],
     normal: Shaped[F32, "n 3"],
     tangent: Shaped[F32, "n 3"],
@@ -86,7 +87,7 @@ def perturb_normals(
     texture_axis = np.asarray(np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent), np.float32)
     texture_axis = unproject(texture_axis, normal, smooth)
     texture = load_normal_map(map_)
-    mapped, length = mean_normal(texture, uv[:, :2], footprint_sides(uv, texture_axis, smooth, wo))
+    mapped, length = mean_normal(texture, uv[:, :2], footprint_sides(uv))
     new_normal = mapped_normal(mapped, smooth, np.column_stack([texture_axis, uv[:, 4]]), smooth)
     new_normal = flip_to_viewer(new_normal, -wo)
     new_tangent = project_to_tangent(unproject(tangent, normal, smooth), new_normal)

@@ -109,7 +109,7 @@ def view_directions(origin: Shaped[F32, "#n 3"], position: Shaped[F32, "n 3"]) -
     return np.asarray(offset / np.linalg.norm(offset, axis=1, keepdims=True), np.float32)
 
 
-def read_uv(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n 5"] | None:
+def read_uv(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n uv"] | None:
     """Read the texture coordinates of samples, see `relume.raytrace.surface_interaction.SurfaceInteraction`.
 
     Args:

@@ -155,7 +155,7 @@ class View:
 
         return self.cache.get_value((self.key, "image", *self.sample_key(material), name), sample)
 
-    def _uv(self, rows: slice) -> Shaped[F32, "n 5"]:
+    def _uv(self, rows: slice) -> Shaped[F32, "n uv"]:
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
         if uv is None:
             raise StoreError("this bake is too old for uploaded images; bake the scene again")

@@ -250,7 +250,7 @@ def test_patches_have_tangents_of_uv_coordinates():
     tangents = np.broadcast_to(np.float32([1, 0, 0, 1]), scene.meshes[0].tangents.shape)
     scene = replace(scene, meshes=(replace(scene.meshes[0], tangents=tangents), *scene.meshes[1:]))
     patches = choose_patches(scene, build_scene_buffers(scene), ("front",), (40, 30), 100)
-    points, uv = patch_sample_points(patches.position, patches.normal), patches.uv.reshape(-1, 5)
+    points, uv = patch_sample_points(patches.position, patches.normal), patches.uv.reshape(-1, patches.uv.shape[2])
     of_floor = np.repeat(patches.material == 0, POINTS_PER_PATCH) & (points.position[:, 1] < 1e-3)
     floor_patches = np.flatnonzero(of_floor)
     assert len(floor_patches) > 20

@@ -32,7 +32,8 @@ def test_axes_are_how_texture_coordinates_change_over_a_pixel() -> None:
         np.array([True]), CORNERS[None].astype(np.float32), UVS[None], np.zeros(1, np.float32),
         normal[None].astype(np.float32), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 4)), uv[None],
     )  # fmt: skip
-    axes = point.pixel_axes(np.float32([distance]), direction[None].astype(np.float32), PIXEL_ANGLE)[0]
+    sides = point.pixel_sides(np.float32([distance]), direction[None].astype(np.float32), PIXEL_ANGLE)
+    axes = point.texture_sides(sides)[0]
     # conjugate diameters of the same ellipse have the same second moments
     np.testing.assert_allclose(axes.T @ axes, differences.T @ differences, rtol=1e-3)
 

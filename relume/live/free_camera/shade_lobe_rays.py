@@ -176,7 +176,9 @@ def _add_lobe(
     footprint = np.zeros((len(rows), 2, 2, 3), np.float32)
     centers = slice(0, num_centers)
     footprint[centers] = pixel_footprint(rows[centers], size[0], points.rows(centers), wo[centers])
-    image = ImagePoints(gbuffer.pixel_of_ray(size[0] * size[1])[rows], np.arange(len(rows)) < num_centers, size)
+    is_center = np.arange(len(rows)) < num_centers
+    pixel = gbuffer.pixel_of_ray(size[0] * size[1])[rows] if num_centers else np.zeros(len(rows), np.intp)
+    image = ImagePoints(pixel, is_center, size)
     light_args = lobe_scene, environment, receivers, footprint, lobe, image, rays_per_point
     local_rays = transfer.lobe_local_rays(light, points)
     radiance = lobe_radiance(*light_args, local_rays, is_direct=light.paths.direct)
