@@ -57,7 +57,7 @@ RAY_MODELS = (
     "lambert",
     "ggx",
 )
-_POLISHED = {"roughness": 0.1, "f0": 0.9}
+_POLISHED_ROUGHNESS = (0.1, 0.09)
 
 
 def precompile() -> None:
@@ -102,6 +102,7 @@ def _exercise(method: BakeMethod, scene: Scene, folder: Path, models: Iterable[s
     )
     if isinstance(transfer, BakedFreeCamera):
         _move_cameras(transfer, FreeCameraPicture(transfer, recipe.views[0], is_watched=True))
+        _polish(transfer, FreeCameraPicture(transfer, recipe.views[0]))
         _apply_btf(transfer, FreeCameraPicture(transfer, recipe.views[0]), folder)
         return
     _apply_btf(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), folder)
@@ -129,12 +130,17 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
     apply_lut(np.zeros((lut.SIZE, lut.SIZE, lut.SIZE, 3), np.uint16), np.zeros((1, 3), np.float32))
 
 
-def _polish(transfer: FixedViewTransfer, picture: Picture) -> None:
-    """Trace along the lobes of polished metals that see each other."""
-    terms = [{"model": "ggx", "params": _POLISHED, "texture": None}]
-    partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
-    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
-    _render(picture)
+def _polish(transfer: FixedViewTransfer | BakedFreeCamera, picture: Picture | FreeCameraPicture) -> None:
+    """Trace along the lobes of polished metals that see each other, and drag their width."""
+    for roughness in _POLISHED_ROUGHNESS:
+        terms = [{"model": "ggx", "params": {"roughness": roughness, "f0": 0.9}, "texture": None}]
+        partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
+        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+        picture.advance(None)
+        if isinstance(picture, Picture):
+            _render(picture)
+            picture.prepare(f"/materials/{transfer.material_names[0]}/terms/0/params/roughness")
+            _render(picture)
 
 
 def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:
