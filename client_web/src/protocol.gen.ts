@@ -503,7 +503,7 @@ export interface ExampleSceneBody {
 /** Exactness of an image with respect to its look, worst first; of several images, the worst counts. - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet. - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image. - INCREMENTAL: an exact image plus the approximate change of its light, or of a curve by merged lights or a subset of the samples. - NEAR_EXACT: a sum over the few nodes of a parameter, of quantized columns, or with noticeable float32 rounding; within a thousandth (relative RMS). - EXACT: the complete sum over all light that was baked. Everything below EXACT is replaced when nobody edits. One number goes with it: the error that the replaced image had, if it was measured (`previous_error`). */
 export type Fidelity = "preview" | "approximate" | "incremental" | "near_exact" | "exact";
 
-/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact; `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after the camera stopped: error of the approximate image before it, relative RMS. `scene_update`: only for kind "scene_update". */
+/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact; `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after the camera stopped: error of the approximate image before it, relative RMS. `traces_lobes`: a free camera traces rays along narrow lobes, which a browser cannot draw. `scene_update`: only for kind "scene_update". */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -520,6 +520,7 @@ export interface FrameHeader {
   alpha: boolean;
   camera_seq: number | null;
   previous_error: number | null;
+  traces_lobes: boolean;
   scene_update: SceneUpdate | null;
   ms: FrameTimes;
 }

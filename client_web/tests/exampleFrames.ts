@@ -19,6 +19,7 @@ export function onePixel(view: string, complete: boolean, at = 0, width = 1): Fr
       alpha: false,
       camera_seq: null,
       previous_error: null,
+      traces_lobes: false,
       scene_update: null,
       ms: { wait: 0, update: 0, encode: 0 },
     },

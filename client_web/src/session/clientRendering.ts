@@ -25,9 +25,13 @@ const LOBE_LIGHTS_ARRAY = "visible_lights";
 export const rendererChoice = signal<RendererMode>(loadRendererChoice());
 /** True if this browser draws them. */
 export const isClientRendering = signal(false);
+/** True if the server traces rays along narrow lobes, which this browser cannot draw. */
+export const tracesLobes = signal(false);
 /** True if the server draws: chosen, or automatic with features that this browser cannot draw. */
 const isServerRendering = computed(
-  () => rendererChoice.value === "server" || (rendererChoice.value === "auto" && usesTexelShading.value),
+  () =>
+    rendererChoice.value === "server" ||
+    (rendererChoice.value === "auto" && (usesTexelShading.value || tracesLobes.value)),
 );
 
 let clientRenderer: ClientRenderer | null = null;
@@ -65,7 +69,8 @@ export function renderIfPossible(view: string): boolean {
 
 /** Handle a frame of the server. */
 export async function onFrame(source: BakeConnection, frame: Frame): Promise<void> {
-  const { view, kind, camera_seq: cameraSeq } = frame.header;
+  const { view, kind, camera_seq: cameraSeq, traces_lobes: traces } = frame.header;
+  if (isFreeCamera(source, view)) tracesLobes.value = traces;
   const renderer = clientRenderer?.connection === source ? clientRenderer : null;
   if (kind === "scene_update") return renderer?.applyTables(frame);
   if (kind === "picture" && renderer !== null) {
@@ -115,10 +120,17 @@ function releaseToServer(): void {
   connection.isRenderingAnnounced = false;
 }
 
+const isFreeCamera = (source: BakeConnection, view: string): boolean =>
+  source.hello?.views.find(({ name }) => name === view)?.camera_mode === "free";
+
 /** Called when a view's image is shown: from now on this browser may draw it. */
 async function offerClientRendering(bakeConnection: BakeConnection, view: string): Promise<void> {
-  const isFree = bakeConnection.hello?.views.find(({ name }) => name === view)?.camera_mode === "free";
-  if (!isFree || bakeConnection !== connections.shown || isServerRendering.peek() || bakeConnection.isRenderingRejected)
+  if (
+    !isFreeCamera(bakeConnection, view) ||
+    bakeConnection !== connections.shown ||
+    isServerRendering.peek() ||
+    bakeConnection.isRenderingRejected
+  )
     return;
   if (clientRenderer?.connection === bakeConnection) return announceClientRendering(clientRenderer);
   if (loadingConnection === bakeConnection) return;

@@ -39,6 +39,7 @@ class Progress:
         tiles: x, y, width, height of the updated tiles. exact: the picture shows its look exactly.
         fidelity: fidelity of the visible region. complete: every term has an image.
         previous_error: relative RMS difference of an exact image from the image it replaces, for a free camera.
+        traces_lobes: a free camera traces rays along narrow lobes, which a browser cannot draw.
     """
 
     tiles: list[Tile]
@@ -46,6 +47,7 @@ class Progress:
     fidelity: Fidelity
     complete: bool
     previous_error: float | None = None
+    traces_lobes: bool = False
 
     @property
     def changed(self) -> bool:

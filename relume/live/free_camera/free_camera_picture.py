@@ -227,14 +227,23 @@ class FreeCameraPicture:
         target = self._target
         is_displayed = target == self._displayed and self._is_coarse == self._must_be_coarse()
         if self._look is None or (is_displayed and not self._is_refined):
-            return Progress([], exact=False, fidelity=self._fidelity, complete=True)
+            return self._progress([])
         self._is_refined = False
         if not is_displayed:
             self._is_coarse = self._must_be_coarse()
             self._is_stale, self._displayed = True, target
         if self.renders_pixels:
             self._render()
-        return Progress(self.all_tiles(), exact=False, fidelity=self._fidelity, complete=True)
+        return self._progress(self.all_tiles())
+
+    def _progress(self, tiles: list[Tile]) -> Progress:
+        """Return the result of a step. tiles: that have changed"""
+        return Progress(tiles, exact=False, fidelity=self._fidelity, complete=True, traces_lobes=self.traces_lobes)
+
+    @property
+    def traces_lobes(self) -> bool:
+        """True if the look has narrow lobes."""
+        return self._look is not None and self._has_narrow_lobes(self._look)
 
     @property
     def _fidelity(self) -> Fidelity:

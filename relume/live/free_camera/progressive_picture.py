@@ -163,7 +163,7 @@ class ProgressivePicture:
 
     def advance(self, max_coefficients: int | None) -> Progress:
         """Advance the displayed picture toward its look and camera; the static view is displayed once it is exact."""
-        step = self._step(max_coefficients)
+        step = replace(self._step(max_coefficients), traces_lobes=self._free_camera_picture.traces_lobes)
         if not self._must_resend:
             return step
         self._must_resend = False

@@ -381,8 +381,8 @@ class FrameHeader(Message):
     """Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera
     that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact;
     `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after
-    the camera stopped: error of the approximate image before it, relative RMS. `scene_update`: only for kind
-    "scene_update".
+    the camera stopped: error of the approximate image before it, relative RMS. `traces_lobes`: a free camera traces
+    rays along narrow lobes, which a browser cannot draw. `scene_update`: only for kind "scene_update".
     """
 
     frame: int
@@ -400,5 +400,6 @@ class FrameHeader(Message):
     alpha: bool = False
     camera_seq: int | None = None
     previous_error: float | None = None
+    traces_lobes: bool = False
     scene_update: SceneUpdate | None = None
     ms: FrameTimes

@@ -1,7 +1,13 @@
 /** Bar over a free-camera image: camera controls, renderer choice, and camera options. */
 import { computed } from "@preact/signals";
 import { useState } from "preact/hooks";
-import { setRenderer, rendererChoice, isClientRendering, type RendererMode } from "../../session/clientRendering";
+import {
+  setRenderer,
+  rendererChoice,
+  isClientRendering,
+  tracesLobes,
+  type RendererMode,
+} from "../../session/clientRendering";
 import { usesTexelShading } from "../../state/look";
 import { scene } from "../../state/scene";
 import { sideBySide, activeViewName, views } from "../../state/views";
@@ -20,7 +26,9 @@ const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This
 function RendererSelect() {
   const serverTitle = usesTexelShading.value
     ? "The server draws while the camera moves, because this look uses BTFs or tri-planar textures."
-    : SERVER_TITLE;
+    : tracesLobes.value
+      ? "The server draws while the camera moves, because polished materials are ray traced."
+      : SERVER_TITLE;
   const title = isClientRendering.value ? BROWSER_TITLE : serverTitle;
   return (
     <label class="renderer-choice" title={title}>

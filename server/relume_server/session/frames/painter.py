@@ -198,6 +198,7 @@ def _header(request: FrameRequest, progress: Progress, ms: FrameTimes, fields: M
         complete=progress.complete,
         camera_seq=request.camera_seq,
         previous_error=progress.previous_error,
+        traces_lobes=progress.traces_lobes,
         ms=ms,
         **fields,
     )
