@@ -244,7 +244,7 @@ class BakedFixedViews:
         rays: list[RayList] = []
         if lobe is not None:
             lights = lights.ungrouped()
-            rays.append(self._lobe_rays(samples, receivers, light, lobe, is_canceled))
+            rays.append(self._lobe_rays(samples, receivers, light, lobe, quality, is_canceled))
         if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
             gather_rays = self._gather_rays(samples, light, quality, is_canceled)
             rays.extend(gather_rays if lobe is None else (only_broad(each, receivers, lobe) for each in gather_rays))
@@ -257,10 +257,14 @@ class BakedFixedViews:
         receivers: ShadingPoints,
         light: Illumination,
         lobe: LobeSampling,
+        quality: LightQuality,
         is_canceled: Callable[[], bool],
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
-        pattern, images = self._lobe_tracer.pattern(lobe), tuple(material.images for material in light.reflectances)
+        pattern, images = (
+            self._lobe_tracer.pattern(lobe, quality),
+            tuple(material.images for material in light.reflectances),
+        )
         narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
         key = digest((pattern.num_rays, lobe.angles, lobe.axes, lobe.quantile.tobytes(), narrow, images))
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled)

@@ -24,6 +24,7 @@ from relume.brdf.texture_slots import TEXTURES, Images
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.retrace import NormalRetracer
 from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
@@ -54,7 +55,7 @@ _PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
 _MAX_LOBES = 255
 _WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
-_NARROW_RAYS, _LOBE_RAYS = 144, 233  # of a sample
+_PREVIEW_RAYS, _NARROW_RAYS, _LOBE_RAYS = 34, 144, 233  # of a sample, Fibonacci numbers
 
 
 class LobePatches(NamedTuple):
@@ -88,9 +89,11 @@ class LobeTracer:
         self._store, self._tracer = store, tracer
         self._textures_with = lru_cache(maxsize=1)(self._replace_textures)  # a look's are as large as the baked ones
 
-    def pattern(self, lobe: LobeSampling) -> LobePattern:
-        """Return the rays of every sample: fewer for a narrow lobe."""
+    def pattern(self, lobe: LobeSampling, quality: LightQuality) -> LobePattern:
+        """Return the rays of every sample: fewer for a narrow lobe, and for a preview."""
         num_rays = _NARROW_RAYS if lobe.median.max() < _WIDE else _LOBE_RAYS
+        if quality is LightQuality.PREVIEW:
+            num_rays = _PREVIEW_RAYS
         return make_lobe_pattern(lobe, num_rays, int(self._store.attributes.get("gather_seed", 0)))
 
     def scene(

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from relume.brdf.albedo import max_albedo_change
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, equal_up_to_reflectances
-from relume.live.fixed_camera.jobs import Job, Priority, ignore_result
+from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback, ignore_result
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.strategies import operator
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget
-from relume.operators.shade import ShadedTerm
+from relume.operators.shade import ShadedTerm, shade
 
 _MAX_ALBEDO_CHANGE = 0.25
 
@@ -94,6 +95,35 @@ def _preparation_job(situation: Situation) -> Job | None:
     )
 
 
+def _lobe_job(situation: Situation) -> Job | None:
+    """Return the job that shows a narrow lobe by more rays when the drag rests, before all light is solved anew."""
+    for target in situation.targets:
+        live, ready, reference = target.live, target.live.ready, target.live.ready.reference
+        if live.lobe is None or reference is None or reference.light is None:
+            continue
+        is_traced = ready.light == live.light and ready.fidelity == Fidelity.APPROXIMATE and ready.traces_lobe
+        if is_traced and reference.changed_curves(live.target_bands):
+            return _more_rays(target, reference.light)
+    return None
+
+
+def _more_rays(target: TermTarget, light: Illumination) -> Job:
+    """Return the job that shades a term by some rays a sample. light: whose patch light is known"""
+    images, material, live = target
+    ready, lobe, term, bands = live.ready, live.lobe, live.term, live.target_bands
+
+    def run(progress: ProgressCallback, is_canceled: CancelCheck) -> ShadedTerm:
+        incident = images.incident_light(material, light, is_canceled, LightQuality.PREVIEW, lobe)
+        return shade(term, bands, *incident, progress, is_canceled)
+
+    def apply(result: ShadedTerm) -> None:
+        if target.exists() and live.ready is ready:
+            live.set_ready(replace(ready, image=result.image, fidelity=Fidelity.INCREMENTAL))
+
+    key = "some lobe rays", *images.image_key(material, live, live.light)
+    return Job(key, target.label, Priority.REFINEMENT, run, apply)
+
+
 EARLIER_REFLECTANCES = Strategy(
     name="earlier reflectances",
     needs="the reference image; the operator of the edited term in its light",
@@ -102,5 +132,5 @@ EARLIER_REFLECTANCES = Strategy(
     changes_light=True,
     is_ready=_is_ready,
     update=_update,
-    jobs={Urgency.PREPARED_CONTROL: _preparation_job},
+    jobs={Urgency.PREVIEW: _lobe_job, Urgency.PREPARED_CONTROL: _preparation_job},
 )
