@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.raytrace.camera_rays import Hits
 from relume.raytrace.scene_buffers import SceneBuffers
-from relume.raytrace.tangents import unit
+from relume.raytrace.tangents import any_tangent, unit
 
 F32 = NDArray[np.float32]
 
@@ -79,7 +79,7 @@ class FacePoints(NamedTuple):
             distance, directions, pixel_angle: as for `footprint`.
         """
         slant = np.einsum("nc,nc->n", self.face_normal, directions)[:, None]
-        along_view = unit(directions - slant * self.face_normal, self.p[:, 1] - self.p[:, 0])
+        along_view = unit(directions - slant * self.face_normal, any_tangent(self.face_normal))
         across_view = np.cross(self.face_normal, along_view)
         side = distance[:, None] * pixel_angle
         return np.stack([side * across_view, side / np.maximum(-slant, 0.05) * along_view], axis=1).astype(np.float32)

@@ -267,7 +267,11 @@ def texels_at(textured, texture):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def isotropic_at(textured, patch, texels):  # type: ignore[no-untyped-def]
-    """Isotropic radiance of a patch at a point of it. texels: from `texels_at`."""
+    """Isotropic radiance of a patch at a point of it.
+
+    Args:
+        textured: `TexturedLight`. patch: index. texels: from `texels_at`.
+    """
     (r, g, b), (s, t, u) = texels
     plain, diffuse, specular = textured.plain[patch], textured.by_diffuse[patch], textured.by_specular[patch]
     return (
@@ -279,7 +283,12 @@ def isotropic_at(textured, patch, texels):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def from_patch(outgoing, textured, patch, texels, world):  # type: ignore[no-untyped-def]
-    """Radiance of a patch at a point of it, against a world-space direction. texels: from `texels_at`."""
+    """Radiance of a patch at a point of it.
+
+    Args:
+        outgoing, textured: of `LobeRays`. patch: index. texels: from `texels_at`.
+        world: direction toward the patch, world space.
+    """
     red, green, blue = isotropic_at(textured, patch, texels)
     row = outgoing.lobe[patch] if outgoing.smooth.shape[0] > 0 else -1
     if row >= 0:

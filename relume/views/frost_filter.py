@@ -99,4 +99,8 @@ def _coverage(
     front = front[index[pixel[front]] >= 0]
     row = index[pixel[front]]
     is_front = material[front] + 1 == glass[row]
-    return np.bincount(row[is_front], weight[front][is_front], len(glass)).astype(np.float64)
+    coverage = np.bincount(row[is_front], weight[front][is_front], len(glass)).astype(np.float64)
+    # of glass behind other glass, only what it shows is stored
+    behind = np.flatnonzero((frost > 0) & (pixel < len(index)))
+    shown = np.bincount(index[pixel[behind]], weight[behind], len(glass)).astype(np.float64)
+    return np.where(coverage > 0, coverage, shown)

@@ -70,7 +70,7 @@ export function renderIfPossible(view: string): boolean {
 /** Handle a frame of the server. */
 export async function onFrame(source: BakeConnection, frame: Frame): Promise<void> {
   const { view, kind, camera_seq: cameraSeq, traces_lobes: traces } = frame.header;
-  if (isFreeCamera(source, view)) tracesLobes.value = traces;
+  if (source === connections.shown && isFreeCamera(source, view)) tracesLobes.value = traces;
   const renderer = clientRenderer?.connection === source ? clientRenderer : null;
   if (kind === "scene_update") return renderer?.applyTables(frame);
   if (kind === "picture" && renderer !== null) {

@@ -136,7 +136,8 @@ class LiveTerm:
         self.light = light
         current = self.ready.reset_for_new_light()
         if is_solo and not self._is_solo:
-            self._before_solo = current.reference
+            before = current.reference  # steps may be added to the reference itself
+            self._before_solo = None if before is None else replace(before, image=before.image.copy())
         elif self._is_solo and not is_solo:
             before, self._before_solo = self._before_solo, None
             if before is not None and not before.changed_curves(self.target_bands):
@@ -209,7 +210,11 @@ class LiveTerm:
         return min(displayed.fidelity, limit if is_current else Fidelity.APPROXIMATE)
 
     def operator_key(self, basis: EditBasis, bands: Mapping[str, F64], light: Illumination) -> tuple[Hashable, ...]:
-        """Dependencies of an operator besides view and material: model, light, and its fixed curves."""
+        """Dependencies of an operator besides view and material: model, light, and its fixed curves.
+
+        Args:
+            basis: its free coefficients. bands: of the term's curves, (3, J) each. light: the illumination.
+        """
         return ((self.model, light), basis, *_rows(bands, basis.affected_curves))
 
     def image_key(self, light: Illumination) -> tuple[Hashable, ...]:

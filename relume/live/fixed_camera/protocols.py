@@ -209,11 +209,11 @@ class LobeShader(Protocol):
     """Images of narrow terms by few rays a sample; `relume.live.opened.few_lobe_rays` implements it."""
 
     def is_prepared(self, light: Illumination) -> bool:
-        """Return whether `shade` only traces. light: the illumination"""
+        """Return whether `shade` has all that takes longer than a frame. light: the illumination"""
         ...
 
-    def prepare(self, light: Illumination) -> None:
-        """Cache all that `shade` needs besides rays. light: the illumination"""
+    def prepare(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
+        """Cache all that `shade` needs besides rays. light: the illumination. is_canceled: polled"""
         ...
 
     def shade(

@@ -83,7 +83,8 @@ class StrategyScheduler:
     def _update_to(self, light: Illumination, targets: Iterable[TermTarget]) -> None:
         for target in targets:
             strategy, ready = self._best_strategy(target, light), target.live.ready
-            if strategy is not None and (ready.light != light or ready.fidelity < strategy.fidelity):
+            is_outdated = ready.light != light or bool(ready.changed_curves(target.live.target_bands))
+            if strategy is not None and (is_outdated or ready.fidelity < strategy.fidelity):
                 strategy.update(target, light, None)
 
     def _can_reach_target(self, target: TermTarget) -> bool:

@@ -448,8 +448,7 @@ def _add_lobe_rays(
         return
     lobes = [material.traced for material in state.materials.projected]
     environment = _prefiltered_environment(transfer, state.light)
-    gain = state.light.environment_gain if state.light.has_environment else (0.0, 0.0, 0.0)
-    environment = environment._replace(gain=np.array(gain, np.float32))
+    environment = environment._replace(gain=np.array(state.light.environment_gain, np.float32))
     stored_scene = transfer.stored_scene_with(state.materials.overrides)
     scene_args = transfer, stored_scene, state.lobe_scene, lobes, state.light, environment
     add_lobe_rays(*scene_args, gbuffer, camera, size, rays, out)

@@ -83,7 +83,7 @@ class FreeCameraPicture:
         self._previous: PreviousImage | None = None
         self._dirty_cache: tuple[GBuffer, bytes, DirtyPixels] | None = None
         self._gbuffer: tuple[int, GBuffer] | None = None
-        self._materials: tuple[Look | None, MaterialState | None] = None, None
+        self._materials: tuple[tuple[Look, bool] | None, MaterialState | None] = None, None
         self._probe_light, self._all_probes = ProbeLightState(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
         self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of hard-shadow lights, for a camera
         self._is_stale = False  # the frame is outdated: its pixels were not requested
@@ -402,8 +402,9 @@ class FreeCameraPicture:
         return gbuffer
 
     def _material_state(self, look: Look) -> MaterialState:
-        previous_look, previous = self._materials
-        if previous is None or previous_look is not look:
+        traces_lobes = self._current_lobe_scene() is not None
+        key, previous = self._materials
+        if previous is None or key is None or key[0] is not look or key[1] != traces_lobes:
             names = self._transfer.material_names
             normals = [look.materials[name].normals for name in names]
             terms = [material_documents(look, name) for name in names]
@@ -415,10 +416,10 @@ class FreeCameraPicture:
                 normals,
                 emission,
                 is_blocking=not self._is_watched,
-                traces_lobes=self._current_lobe_scene() is not None,
+                traces_lobes=traces_lobes,
             )
             self._materials_version += materials is not previous
-            self._materials = look, materials
+            self._materials = (look, traces_lobes), materials
             return materials
         return previous
 

@@ -213,7 +213,8 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):
     is_wide, ratio = widths[0] > radius, spread / max(widths[0], radius)
     num = min(int(_LEAST_JITTERS + _JITTERS_OF_EQUAL * ratio * ratio), _MOST_JITTERS)
     d_t, d_b = tangents_of(direction)
-    cos_radius, sin_radius, total = np.float32(math.cos(radius)), np.float32(math.sin(radius)), _ZERO
+    sin_radius, half_chord, total = np.float32(math.sin(radius)), np.float32(math.sin(_HALF * radius)), _ZERO
+    chord_squared = np.float32(4) * half_chord * half_chord  # by π the solid angle: 2π (1 − cos ρ) = 4π sin² ρ/2
     for k in range(num):
         u, v = ray_jitter(k, seed)
         (t, b, n), o = jittered_frame(normal, points.tangent[p], wo[p], part, u - _HALF, v - _HALF)
@@ -231,9 +232,10 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):
             angle = angle_at_quantile(pattern.quantile, 0, r)
             (x, y, z), is_valid = lobe_direction(pattern.is_half_angle, angle, azimuth, o[0], o[1], o[2])
             local = _local((t, b, n), direction)
-            if is_valid and z > 0 and x * local[0] + y * local[1] + z * local[2] > cos_radius:
+            dx, dy, dz = x - local[0], y - local[1], z - local[2]
+            if is_valid and z > 0 and dx * dx + dy * dy + dz * dz < chord_squared:
                 total += _ONE
-    scale = _ONE if is_wide else _ONE / (_TWO * _PI * (_ONE - cos_radius))
+    scale = _ONE if is_wide else _ONE / (_PI * chord_squared)
     return scale * total / np.float32(num)
 
 

@@ -177,8 +177,12 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 def perturbed_normal(  # type: ignore[no-untyped-def]
     textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
 ):
-    """Apply the normal map to the normal n of a pixel. outward: outward of the face. is_back_face: the ray hits its
-    back.
+    """Apply the normal map to the normal n of a pixel.
+
+    Args:
+        textures, texture, texture_uv, footprint, scratch: see `normal_tilt`. tangents: of all corners.
+        corners: the triangle's three, a tuple. uv: barycentric, of the last two corners. n: interpolated normal.
+        outward: normal of the face. is_back_face: the ray hits its back.
     """
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]

@@ -33,7 +33,8 @@ MAX_RAYS = 60_000
 _MOST_RAYS = 8  # of a point
 _SEED = 1
 _STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads points evenly
-_REACH = 2  # pixels from which rays are shared
+_REACH, _MAX_REACH = 2, 32  # pixels from which rays are shared, and where there are none nearer
+_LEAST_POINTS = 256  # with rays of their own
 _SHARED_PART = np.float32(0.5)  # of the squared widths of lobe and pixel
 _LEAST_WEIGHT = np.float32(1e-3)  # of the nearest neighbor, where no other agrees
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
@@ -60,6 +61,22 @@ def _mirror_direction(points, p, wo):  # type: ignore[no-untyped-def]
     return twice * n[0] - o[0], twice * n[1] - o[1], twice * n[2] - o[2]
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _weight(points, wo, position, n, r, q, sharpness):  # type: ignore[no-untyped-def]
+    """Weight of a neighbor q, by its mirror direction; zero if it is no continuation of the surface.
+
+    Args:
+        points, wo, q: the neighbor. position, n, r: of the point, with its mirror direction. sharpness: of the weight.
+    """
+    neighbor, s = points.position[q], _mirror_direction(points, q, wo)
+    dx, dy, dz = neighbor[0] - position[0], neighbor[1] - position[1], neighbor[2] - position[2]
+    rise = n[0] * dx + n[1] * dy + n[2] * dz
+    if rise * rise > np.float32(0.25) * (dx * dx + dy * dy + dz * dz):
+        return _ZERO
+    dx, dy, dz = r[0] - s[0], r[1] - s[1], r[2] - s[2]
+    return np.float32(math.exp(-sharpness * (dx * dx + dy * dy + dz * dz)))
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _share(row_of_pixel, width, pixel, points, wo, footprint, lobe_width, radiance, start, stop, out):  # type: ignore[no-untyped-def]
     """Average neighbors of points [start, stop); see `share_with_neighbors`. lobe_width: radians"""
@@ -69,23 +86,20 @@ def _share(row_of_pixel, width, pixel, points, wo, footprint, lobe_width, radian
         x, n, position, r = pixel[p] - y * width, points.normal[p], points.position[p], _mirror_direction(points, p, wo)
         spread = half_vector_spread(footprint, p)
         sharpness = _ONE / (_SHARED_PART * (lobe_width * lobe_width + spread * spread) + np.float32(1e-12))
-        total = _ZERO
-        for row in range(max(y - _REACH, 0), min(y + _REACH + 1, height)):
-            for column in range(max(x - _REACH, 0), min(x + _REACH + 1, width)):
-                q = row_of_pixel[row * width + column]
-                if q < 0:
-                    continue
-                other, s = points.position[q], _mirror_direction(points, q, wo)
-                dx, dy, dz = other[0] - position[0], other[1] - position[1], other[2] - position[2]
-                rise = n[0] * dx + n[1] * dy + n[2] * dz
-                is_near = rise * rise <= np.float32(0.25) * (dx * dx + dy * dy + dz * dz)
-                dx, dy, dz = r[0] - s[0], r[1] - s[1], r[2] - s[2]
-                weight = np.float32(math.exp(-sharpness * (dx * dx + dy * dy + dz * dz))) if is_near else _ZERO
-                distance = np.float32((row - y) * (row - y) + (column - x) * (column - x))
-                weight += _LEAST_WEIGHT / (_ONE + distance * distance * distance)
-                total += weight
-                for channel in range(3):
-                    out[p, channel] += weight * radiance[q, channel]
+        total, reach = _ZERO, _REACH
+        while total == 0 and reach <= _MAX_REACH:
+            for row in range(max(y - reach, 0), min(y + reach + 1, height)):
+                for column in range(max(x - reach, 0), min(x + reach + 1, width)):
+                    q = row_of_pixel[row * width + column]
+                    if q < 0:
+                        continue
+                    weight = _weight(points, wo, position, n, r, q, sharpness)
+                    distance = np.float32((row - y) * (row - y) + (column - x) * (column - x))
+                    weight += _LEAST_WEIGHT / (_ONE + distance * distance * distance)
+                    total += weight
+                    for channel in range(3):
+                        out[p, channel] += weight * radiance[q, channel]
+            reach *= 4
         scale = _ONE / max(total, np.float32(1e-20))
         for channel in range(3):
             out[p, channel] *= scale
@@ -136,7 +150,8 @@ def lobe_radiance(
     core, pattern = (make_lobe_pattern(sampling, num_rays, _SEED) for sampling in (lobe.core, lobe.sampling))
     lobe_width, light_args = lobe_widths(pattern)[0], (scene, environment)
     y, x = np.divmod(image.pixel, max(image.size[0], 1))
-    is_traced = image.is_first & ((x * _STEP_X + y * _STEP_Y) % 1.0 < rays_per_point)
+    share = max(rays_per_point, _LEAST_POINTS / max(int(np.count_nonzero(image.is_first)), 1))
+    is_traced = image.is_first & ((x * _STEP_X + y * _STEP_Y) % 1.0 < share)
     traced = np.flatnonzero(is_traced) if image.is_first.any() else np.arange(len(is_traced))
     radiance = np.zeros((len(is_traced), 3), np.float32)
     points, sides = receivers.without_light(traced), footprint[traced]

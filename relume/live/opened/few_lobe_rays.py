@@ -2,68 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import Samples
 from relume.live.free_camera.basis.outgoing_coefficients import cosines
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
-from relume.live.opened.prefiltered_environments import PrefilteredEnvironments
+from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
 from relume.transport.lobe_scene import LobeScene
 from relume.views.view import View
 
-if TYPE_CHECKING:
-    from relume.live.opened.fixed_views import BakedFixedViews
-
 F32 = NDArray[np.float32]
+
+
+class LobeSource(EnvironmentSource, Protocol):
+    """An opened bake, as far as lobe rays need it."""
+
+    def lobe_scene(self, light: Illumination, is_canceled: CancelCheck) -> LobeScene: ...
 
 
 @dataclass(frozen=True)
 class FewLobeRays:
     """Shades narrow terms of an opened bake by few rays a sample. See `relume.live.free_camera.lobe_radiance`."""
 
-    light_transport: BakedFixedViews
+    light_transport: LobeSource
 
     @cached_property
     def _environments(self) -> PrefilteredEnvironments:
         return PrefilteredEnvironments(self.light_transport)
 
-    def _scene(self, light: Illumination) -> LobeScene:
-        """Return the surfaces that rays meet, cached. light: the illumination"""
+    def _scene(self, light: Illumination, is_canceled: CancelCheck = lambda: False) -> LobeScene:
+        """Return the surfaces that rays meet, cached. light: the illumination. is_canceled: polled"""
         transport = self.light_transport
-        key = transport.key, "scene of lobe rays", light
-        return transport.cache.transient.get_value(key, lambda: transport.lobe_scene(light))
+        return transport.cache.transient.get_value(
+            self._scene_key(light), lambda: transport.lobe_scene(light, is_canceled)
+        )
+
+    def _scene_key(self, light: Illumination) -> tuple[Hashable, ...]:
+        return self.light_transport.key, "scene of lobe rays", light
 
     def environment(self, light: Illumination) -> PrefilteredEnvironment:
         """Return the environment behind a scene, cached. light: the illumination"""
         environment = light.environment
-        gain = light.environment_gain if light.has_environment else (0.0, 0.0, 0.0)
         lookup, bright_lights = (
             self._environments.environment_lookup(environment.map),
             self._environments.bright_lights(environment),
         )
-        return PrefilteredEnvironment(
-            lookup, bright_lights, rotation_of(environment.rotation), np.array(gain, np.float32)
-        )
+        gain = np.array(light.environment_gain, np.float32)
+        return PrefilteredEnvironment(lookup, bright_lights, rotation_of(environment.rotation), gain)
 
     def is_prepared(self, light: Illumination) -> bool:
-        """Return whether `shade` only traces: the blurred environment takes a second. light: the illumination"""
-        return self._environments.has_environment_lookup(light.environment.map)
+        """Return whether `shade` has all that takes longer than a frame. light: the illumination"""
+        has_environment = self._environments.has_environment_lookup(light.environment.map)
+        return has_environment and self.light_transport.cache.transient.contains(self._scene_key(light))
 
-    def prepare(self, light: Illumination) -> None:
-        """Cache all that `shade` needs besides rays. light: the illumination"""
+    def prepare(self, light: Illumination, is_canceled: CancelCheck) -> None:
+        """Cache all that `shade` needs besides rays. light: the illumination. is_canceled: polled"""
         self.environment(light)
-        self._scene(light)
+        self._scene(light, is_canceled)
 
     def shade(
         self, samples: Samples, view: View, material: int, light: Illumination, document: Mapping[str, Any]

@@ -26,14 +26,16 @@ from relume.lights.local_lights import num_samples
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
-from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.illumination import Illumination, emission_images
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.few_lobe_rays import FewLobeRays
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import (
+    HitImages,
     LobePatches,
     LobeTracer,
     choose_peaks,
+    hit_images,
     lobe_environment,
     narrow_surfaces,
     no_lobe_patches,
@@ -261,10 +263,7 @@ class BakedFixedViews:
         is_canceled: Callable[[], bool],
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
-        pattern, images = (
-            self._lobe_tracer.pattern(lobe, quality),
-            tuple(material.images for material in light.reflectances),
-        )
+        pattern, images = self.lobe_tracer.pattern(lobe, quality), self._hit_images(light)
         narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
         key = digest((pattern.num_rays, lobe.angles, lobe.axes, lobe.quantile.tobytes(), narrow, images))
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled)
@@ -289,7 +288,13 @@ class BakedFixedViews:
         reflectances = light.reflectances
         goes_on = light.paths.has_all_bounces and bool(narrow_surfaces(reflectances))
         light_args = self._patch_light(light, is_canceled), self._mesh_emission(light)
-        return self._lobe_tracer.scene(reflectances, self._lobe_patches(reflectances), *light_args, goes_on=goes_on)
+        surface_args = reflectances, self._hit_images(light), self._lobe_patches(reflectances)
+        return self.lobe_tracer.scene(*surface_args, *light_args, goes_on=goes_on)
+
+    def _hit_images(self, light: Illumination) -> HitImages:
+        """Return the images of a look that lobe rays meet."""
+        emission = emission_images((source.geometry for source in light.local), self.local.emission_image)
+        return hit_images(light.reflectances, self.material_names, emission)
 
     def _mesh_emission(self, light: Illumination) -> Shaped[F32, "materials 3"]:
         """Return the radiance of the surfaces of each material that is a light; its image is relative to it."""
@@ -340,7 +345,8 @@ class BakedFixedViews:
         return ()
 
     @cached_property
-    def _lobe_tracer(self) -> LobeTracer:
+    def lobe_tracer(self) -> LobeTracer:
+        """Traces lobe rays."""
         return LobeTracer(self.store, self.tracer)
 
     def downsampled(self, view_name: str, step: int) -> Self:

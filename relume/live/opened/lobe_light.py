@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from relume.assets.environments.equirect import (
 from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
 from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS
-from relume.brdf.texture_slots import TEXTURES, Images
+from relume.brdf.texture_slots import TEXTURES, EmissionImage
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
@@ -31,6 +31,7 @@ from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.raytrace.surface_textures import (
+    MapName,
     TextureCoordinates,
     Textures,
     project_missing,
@@ -56,6 +57,22 @@ _MAX_LOBES = 255
 _WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _PREVIEW_RAYS, _NARROW_RAYS, _LOBE_RAYS = 34, 144, 233  # of a sample, Fibonacci numbers
+
+
+HitImages = tuple[tuple[MapName | None, ...], ...]
+"""Images of a look that replace textures of each material, as columns of `Textures.material_textures`."""
+
+
+def hit_images(
+    reflectances: Reflectances, materials: Sequence[str], emission: Mapping[str, EmissionImage]
+) -> HitImages:
+    """Return the images of a look that lobe rays meet.
+
+    Args:
+        reflectances: of all materials, or empty. materials: their names. emission: emitted image of each, by name.
+    """
+    images = [each.images for each in reflectances] or [(None, None)] * len(materials)
+    return tuple((*image, None, emission.get(name)) for image, name in zip(images, materials, strict=True))
 
 
 class LobePatches(NamedTuple):
@@ -99,6 +116,7 @@ class LobeTracer:
     def scene(
         self,
         reflectances: Reflectances,
+        images: HitImages,
         patches: LobePatches,
         outgoing: OutgoingLight,
         emission: Shaped[F32, "materials 3"],
@@ -108,19 +126,17 @@ class LobeTracer:
         """Return the surfaces that lobe rays meet. See `LobeScene`.
 
         Args:
-            reflectances: of all materials. patches: their textures and reflectances.
+            reflectances: of all materials. images: of the look, see `hit_images`.
+            patches: their textures and reflectances.
             outgoing, emission: as in `LobeScene`. goes_on: rays go on from narrow lobes.
         """
-        images = tuple(material.images for material in reflectances)
         tint = patches.mean[TEXTURES.index("specular")]
         surfaces = self._surfaces(reflectances if goes_on else (), tint, images)
         textured = textured_light(outgoing.isotropic, patches.unit_share, patches.mean, surfaces.textures.slots)
         light_args = outgoing, textured, patches.broad_share, emission if goes_on else NO_EMISSION
         return LobeScene(self._tracer.geometry, self._lookup, surfaces, *light_args)
 
-    def _surfaces(
-        self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: tuple[Images, ...]
-    ) -> LobeSurfaces:
+    def _surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: HitImages) -> LobeSurfaces:
         """Return the surfaces that rays meet; those of `reflectances` with narrow lobes pass rays on."""
         geometry, lobes = self._tracer.geometry, list(map(_narrow_lobe, reflectances))
         textures = self._textures_with(images)
@@ -155,8 +171,8 @@ class LobeTracer:
             offset=geometry.epsilon,
         )
 
-    def _replace_textures(self, images: tuple[Images, ...]) -> HitTextures:
-        """Return the textures of all surfaces. images: of the look, for each material"""
+    def _replace_textures(self, images: HitImages) -> HitTextures:
+        """Return the textures of all surfaces. images: of the look, see `hit_images`"""
         if self._textures is None:
             return NO_TEXTURES
         baked, coordinates = self._textures

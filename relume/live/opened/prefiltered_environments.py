@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import rotate_about_y
+from relume.core.cache import Cache
 from relume.core.color import luminance
 from relume.lights.prefilter import downsampled, prefiltered
+from relume.lights.sphere_tiles import Tiles
+from relume.lights.spherical_triangles import TriangleLights
 from relume.lights.sun_disks import BRIGHT_LIGHT_BOUNDS, SplitEnvironment, remove_sun_disks
 from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.free_camera.environment_lookup import EnvironmentLookup, build_environment_lookup
@@ -21,17 +24,32 @@ from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLight
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, build_light_lists
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
 
-if TYPE_CHECKING:
-    from relume.live.opened.fixed_views import BakedFixedViews
-
 F32 = NDArray[np.float32]
+
+
+class EnvironmentSource(Protocol):
+    """The environments of an opened bake, and its light triangles; `BakedFixedViews` implements it."""
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def cache(self) -> Cache: ...
+    @property
+    def tiles(self) -> Tiles: ...
+    @property
+    def lights(self) -> TriangleLights: ...
+    @property
+    def shadow_ray_directions(self) -> Shaped[F32, "M 3"]: ...
+    def cache_owner(self, name: str | None) -> str: ...
+    def environment_radiance(self, name: str | None) -> Shaped[F32, "height width 3"]: ...
+    def environment_lights(self, environment: EnvironmentKey, quality: LightQuality) -> TriangleLights: ...
 
 
 @dataclass(frozen=True)
 class PrefilteredEnvironments:
     """Prefiltered environments of an opened bake, cached."""
 
-    light_transport: BakedFixedViews
+    light_transport: EnvironmentSource
 
     def _split(self, name: str | None) -> SplitEnvironment:
         """Split an environment, None for the scene's own, into bright lights and the rest."""

@@ -24,6 +24,7 @@ from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
 from relume.live.opened.fixed_views import SelectedSamples
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.lobe_light import LobeTracer
 from relume.live.opened.local_lights import LocalLights
 from relume.methods.gather import GatherMethod
 from relume.operators.image_cache import ImageFiles
@@ -102,6 +103,11 @@ class StaticView(BakedIndirectViews):
     def local(self) -> LocalLights:
         """Local lights of the scene."""
         return self.light_transport.local
+
+    @cached_property
+    def lobe_tracer(self) -> LobeTracer:
+        """Traces lobe rays."""
+        return self.light_transport.lobe_tracer
 
     @cached_property
     def indirect(self) -> IndirectSolver:

@@ -30,15 +30,26 @@ _MAX_ALBEDO_CHANGE = 0.25
 def _is_ready(target: TermTarget, light: Illumination) -> bool:
     images, material, live = target
     reference = live.ready.reference
-    if reference is None or reference.light is None or not equal_up_to_reflectances(reference.light, light):
+    if reference is None or reference.light is None or not _is_similar(reference.light, light):
         return False
-    if max_albedo_change(reference.light.reflectances, light.reflectances) > _MAX_ALBEDO_CHANGE:
-        return False  # other surfaces show it
     changed = set(reference.changed_curves(live.target_bands))
     if not changed or _traces_lobe(target, reference.light):
         return True
-    steps = images.operator(material, live, reference)
-    return steps is not None and reference.basis is not None and changed <= set(reference.basis.affected_curves)
+    basis = reference.basis
+    if basis is None or not basis.is_valid_for(live.document) or not changed <= set(basis.affected_curves):
+        return False
+    return images.operator(material, live, reference) is not None
+
+
+def _is_similar(before: Illumination, after: Illumination) -> bool:
+    """Return whether two lights differ only in reflectances, and little: other surfaces would show a larger change."""
+    return (
+        equal_up_to_reflectances(before, after)
+        and before.paths == after.paths
+        and [(each.images, each.normals) for each in before.reflectances]
+        == [(each.images, each.normals) for each in after.reflectances]
+        and max_albedo_change(before.reflectances, after.reflectances) <= _MAX_ALBEDO_CHANGE
+    )
 
 
 def _update(target: TermTarget, light: Illumination, max_coefficients: int | None) -> None:
@@ -84,12 +95,12 @@ def _preparation_job(situation: Situation) -> Job | None:
         return None
     if not prepared.target.live.changes_lobe(prepared.basis):
         return None
-    key = "lobe rays", situation.images.transfer.key, light.environment
+    key = "lobe rays", situation.images.transfer.key, light
     return Job(
         key,
         f"{prepared.target.name}, reflections",
         Priority.CONTROL,
-        lambda progress, is_canceled: shader.prepare(light),
+        lambda progress, is_canceled: shader.prepare(light, is_canceled),
         ignore_result,
         state="precomputing",
     )
@@ -118,7 +129,7 @@ def _more_rays(target: TermTarget, light: Illumination) -> Job:
 
     def apply(result: ShadedTerm) -> None:
         if target.exists() and live.ready is ready:
-            live.set_ready(replace(ready, image=result.image, fidelity=Fidelity.INCREMENTAL))
+            live.set_ready(replace(ready, image=result.image, fidelity=Fidelity.INCREMENTAL, bands=bands))
 
     key = "some lobe rays", *images.image_key(material, live, live.light)
     return Job(key, target.label, Priority.REFINEMENT, run, apply)
