@@ -217,13 +217,19 @@ class LobeShader(Protocol):
         ...
 
     def shade(
-        self, samples: Samples, view: View, material: int, light: Illumination, document: Mapping[str, Any]
+        self,
+        samples: Samples,
+        view: View,
+        material: int,
+        light: Illumination,
+        patch_light: Illumination,
+        document: Mapping[str, Any],
     ) -> Shaped[F32, "n 3"] | None:
         """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
 
         Args:
             samples: all samples of a material of a view. view, material: the view, and the index.
-            light: the illumination. document: the term.
+            light: the illumination. patch_light: a similar one, for which this is prepared. document: the term.
         """
         ...
 
@@ -290,6 +296,7 @@ class FixedViewTransfer(OpenBake, Protocol):
         quality: LightQuality = LightQuality.EXACT,
         is_canceled: Callable[[], bool] = lambda: False,
         lobe: LobeSampling | None = None,
+        patch_light: Illumination | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at samples; missing rays are traced.
 
@@ -298,6 +305,7 @@ class FixedViewTransfer(OpenBake, Protocol):
             quality: accuracy of the light.
             is_canceled: polled regularly.
             lobe: of the one term that is lit, along which rays are traced; None: light from everywhere.
+            patch_light: whose light of patches lobe rays bring; None: of `light`.
         Raises:
             CancelledError: `is_canceled` returned true.
         """

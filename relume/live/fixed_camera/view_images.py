@@ -193,10 +193,11 @@ class ViewImages:
         is_canceled: Callable[[], bool],
         quality: LightQuality = LightQuality.EXACT,
         lobe: LobeSampling | None = None,
+        patch_light: Illumination | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at the samples of a material. See `FixedViewTransfer.incident_light`."""
         samples = self.transfer.samples(self.view, material.index, self.cache)
-        return self.transfer.incident_light(samples, light, quality, is_canceled, lobe)
+        return self.transfer.incident_light(samples, light, quality, is_canceled, lobe, patch_light)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""

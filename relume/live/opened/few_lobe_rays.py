@@ -21,6 +21,7 @@ from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
 from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
 from relume.transport.lobe_scene import LobeScene
+from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
@@ -29,7 +30,9 @@ F32 = NDArray[np.float32]
 class LobeSource(EnvironmentSource, Protocol):
     """An opened bake, as far as lobe rays need it."""
 
-    def lobe_scene(self, light: Illumination, is_canceled: CancelCheck) -> LobeScene: ...
+    def lobe_scene(
+        self, light: Illumination, is_canceled: CancelCheck, outgoing: OutgoingLight | None = None
+    ) -> LobeScene: ...
 
 
 @dataclass(frozen=True)
@@ -73,13 +76,19 @@ class FewLobeRays:
         self._scene(light, is_canceled)
 
     def shade(
-        self, samples: Samples, view: View, material: int, light: Illumination, document: Mapping[str, Any]
+        self,
+        samples: Samples,
+        view: View,
+        material: int,
+        light: Illumination,
+        patch_light: Illumination,
+        document: Mapping[str, Any],
     ) -> Shaped[F32, "n 3"] | None:
         """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
 
         Args:
             samples: all samples of a material of a view. view, material: the view, and the index.
-            light: the illumination. document: the term.
+            light: the illumination. patch_light: a similar one, for which this is prepared. document: the term.
         """
         traced, _ = split_terms([{**document, "color": [1.0] * 3, "texture": None}])
         if traced is None:
@@ -87,7 +96,9 @@ class FewLobeRays:
         receivers = samples.receivers(is_lit=False)
         image = self._image_points(view, material)
         footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
-        light_args = self._scene(light), self.environment(light), receivers, footprint
+        outgoing = self._scene(patch_light).outgoing
+        scene = self.light_transport.lobe_scene(light, lambda: False, outgoing)
+        light_args = scene, self.environment(light), receivers, footprint
         rays_per_point = MAX_RAYS / max(int(np.count_nonzero(image.is_first)), 1)
         ray_args = traced, image, rays_per_point, local_rays
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)

@@ -239,6 +239,7 @@ class BakedFixedViews:
         quality: LightQuality = LightQuality.EXACT,
         is_canceled: Callable[[], bool] = lambda: False,
         lobe: LobeSampling | None = None,
+        patch_light: Illumination | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at samples. See `FixedViewTransfer`."""
         lights = self.direct_lights(light, quality if lobe is None else LightQuality.EXACT)
@@ -246,7 +247,7 @@ class BakedFixedViews:
         rays: list[RayList] = []
         if lobe is not None:
             lights = lights.ungrouped()
-            rays.append(self._lobe_rays(samples, receivers, light, lobe, quality, is_canceled))
+            rays.append(self._lobe_rays(samples, receivers, light, lobe, quality, is_canceled, patch_light))
         if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
             gather_rays = self._gather_rays(samples, light, quality, is_canceled)
             rays.extend(gather_rays if lobe is None else (only_broad(each, receivers, lobe) for each in gather_rays))
@@ -261,12 +262,14 @@ class BakedFixedViews:
         lobe: LobeSampling,
         quality: LightQuality,
         is_canceled: Callable[[], bool],
+        patch_light: Illumination | None,
     ) -> LobeRays:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
         pattern, images = self.lobe_tracer.pattern(lobe, quality), self._hit_images(light)
         narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
         key = digest((pattern.num_rays, lobe.angles, lobe.axes, lobe.quantile.tobytes(), narrow, images))
-        footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled)
+        outgoing = None if patch_light is None else self._patch_light(patch_light, is_canceled)
+        footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled, outgoing)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
         environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
         light_args = scene.outgoing, scene.textured, environment, scene.broad_share
@@ -277,17 +280,23 @@ class BakedFixedViews:
         """Images of narrow terms by few rays a sample."""
         return FewLobeRays(self)
 
-    def lobe_scene(self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False) -> LobeScene:
+    def lobe_scene(
+        self,
+        light: Illumination,
+        is_canceled: Callable[[], bool] = lambda: False,
+        outgoing: OutgoingLight | None = None,
+    ) -> LobeScene:
         """Return the surfaces that lobe rays meet, with their light.
 
         Args:
-            light: the illumination. is_canceled: polled.
+            light: the illumination. is_canceled: polled. outgoing: light of the patches; None: that of `light`.
         Raises:
             CancelledError: `is_canceled` returned true.
         """
         reflectances = light.reflectances
         goes_on = light.paths.has_all_bounces and bool(narrow_surfaces(reflectances))
-        light_args = self._patch_light(light, is_canceled), self._mesh_emission(light)
+        patch_light = self._patch_light(light, is_canceled) if outgoing is None else outgoing
+        light_args = patch_light, self._mesh_emission(light)
         surface_args = reflectances, self._hit_images(light), self._lobe_patches(reflectances)
         return self.lobe_tracer.scene(*surface_args, *light_args, goes_on=goes_on)
 

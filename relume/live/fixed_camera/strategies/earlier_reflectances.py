@@ -59,7 +59,7 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     assert reference.light is not None
     state = replace(live.ready, fidelity=Fidelity.APPROXIMATE, light=light)
     if reference.changed_curves(live.target_bands) and _traces_lobe(target, reference.light):
-        image = _trace_lobe(target, reference.light)
+        image = _trace_lobe(target, light, reference.light)
         live.set_ready(replace(state, image=image, bands=live.target_bands, traces_lobe=True))
         return
     steps = images.operator(material, live, reference)
@@ -76,11 +76,14 @@ def _traces_lobe(target: TermTarget, light: Illumination) -> bool:
     return is_round and not live.levels.pairs and shader.is_prepared(light)
 
 
-def _trace_lobe(target: TermTarget, light: Illumination) -> Shaped[NDArray[np.float32], "tiles 3 samples"]:
-    """Return the image of a narrow term by few rays a sample."""
+def _trace_lobe(
+    target: TermTarget, light: Illumination, patch_light: Illumination
+) -> Shaped[NDArray[np.float32], "tiles 3 samples"]:
+    """Return the image of a narrow term by few rays a sample. patch_light: whose light of patches is known"""
     images, material, live = target
     samples = images.transfer.samples(images.view, material.index, images.cache)
-    rows = images.transfer.few_lobe_rays.shade(samples, images.view, material.index, light, live.document)
+    light_args = light, patch_light, live.document
+    rows = images.transfer.few_lobe_rays.shade(samples, images.view, material.index, *light_args)
     assert rows is not None  # its lobe is narrow
     if live.view_factor is not None:
         rows /= np.maximum(live.view_factor.T, np.float32(1e-6))
@@ -118,13 +121,14 @@ def _lobe_job(situation: Situation) -> Job | None:
     return None
 
 
-def _more_rays(target: TermTarget, light: Illumination) -> Job:
-    """Return the job that shades a term by some rays a sample. light: whose patch light is known"""
+def _more_rays(target: TermTarget, patch_light: Illumination) -> Job:
+    """Return the job that shades a term by some rays a sample. patch_light: whose light of patches is known"""
     images, material, live = target
-    ready, lobe, term, bands = live.ready, live.lobe, live.term, live.target_bands
+    light, ready, lobe, term, bands = live.light, live.ready, live.lobe, live.term, live.target_bands
 
     def run(progress: ProgressCallback, is_canceled: CancelCheck) -> ShadedTerm:
-        incident = images.incident_light(material, light, is_canceled, LightQuality.PREVIEW, lobe)
+        light_args = light, is_canceled, LightQuality.PREVIEW, lobe, patch_light
+        incident = images.incident_light(material, *light_args)
         return shade(term, bands, *incident, progress, is_canceled)
 
     def apply(result: ShadedTerm) -> None:
