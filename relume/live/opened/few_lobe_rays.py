@@ -32,7 +32,13 @@ class LobeSource(EnvironmentSource, Protocol):
 
     def lobe_scene(
         self, light: Illumination, is_canceled: CancelCheck, outgoing: OutgoingLight | None = None
-    ) -> LobeScene: ...
+    ) -> LobeScene:
+        """Return the surfaces that lobe rays meet, with their light.
+
+        Args:
+            light: the illumination. is_canceled: polled. outgoing: light of the patches; None: that of `light`.
+        """
+        ...
 
 
 @dataclass(frozen=True)
