@@ -58,6 +58,7 @@ class FurnaceViews(BakedFixedViews):
         quality: LightQuality = LightQuality.EXACT,
         is_canceled: Callable[[], bool] = lambda: False,
         lobe: LobeSampling | None = None,
+        patch_light: Illumination | None = None,
     ) -> LightsAndPoints:
         """Surface radiance along gather rays, without the environment; enough for any lobe, as it is the same."""
         rays = replace(samples.gather_rays(is_canceled), outgoing=self.glow(light))
