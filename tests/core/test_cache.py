@@ -153,6 +153,7 @@ BOUNDED = {
     "live/free_camera/basis/highlight_lobes.py",
     "live/free_camera/basis/lobe_shapes.py",
     "live/free_camera/basis/outgoing_coefficients.py",
+    "live/free_camera/lobe_terms.py",
     "live/free_camera/normal_mapping.py",
     "live/opened/lobe_light.py",
     "look/library/materials.py",

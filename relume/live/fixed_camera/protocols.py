@@ -219,6 +219,7 @@ class LobeShader(Protocol):
     def shade(
         self,
         samples: Samples,
+        receivers: ShadingPoints,
         view: View,
         material: int,
         light: Illumination,
@@ -228,7 +229,8 @@ class LobeShader(Protocol):
         """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
 
         Args:
-            samples: all samples of a material of a view. view, material: the view, and the index.
+            samples: all samples of a material of a view. receivers: the same, without light.
+            view, material: the view, and the index.
             light: the illumination. patch_light: a similar one, for which this is prepared. document: the term.
         """
         ...

@@ -40,7 +40,7 @@ from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlight_edges import render_fine_frame
 from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, find_dirty_pixels
-from relume.live.free_camera.lobe_terms import split_terms
+from relume.live.free_camera.lobe_terms import has_traced_lobe
 from relume.live.free_camera.occluded_probes import reweight
 from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
 from relume.live.free_camera.probe_light import LightRequest, ProbeLightState
@@ -427,7 +427,7 @@ class FreeCameraPicture:
         """Return whether a material of a look has terms for lobe rays."""
         if self._narrow_look[0] is not look:
             documents = (material_documents(look, name) for name in self._transfer.material_names)
-            self._narrow_look = look, any(split_terms(terms)[0] is not None for terms in documents)
+            self._narrow_look = look, any(map(has_traced_lobe, documents))
         return self._narrow_look[1]
 
     def _current_lobe_scene(self) -> LobeScene | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import directional_albedo
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
 from relume.brdf.roughness_levels import NO_LEVELS
 from relume.brdf.texture_slots import texture_slot
@@ -33,15 +35,21 @@ class TracedLobe(NamedTuple):
     albedo: Shaped[F32, "rows groups 3"]
 
 
-def _round_lobe(term: Mapping[str, Any]) -> LobeSampling | None:
+def has_traced_lobe(terms: Terms) -> bool:
+    """Return whether a material has narrow terms. terms: of a complete look"""
+    return any(_round_lobe(FrozenTerm.from_document(term)) is not None for term in terms)
+
+
+@lru_cache(maxsize=64)
+def _round_lobe(term: FrozenTerm) -> LobeSampling | None:
     """Return the distribution of rays of a term; None if its lobe is wide or anisotropic."""
-    sampling = sample_lobe(term, NO_LEVELS)
+    sampling = sample_lobe(term.document, NO_LEVELS)
     return sampling if sampling is not None and sampling.is_round else None
 
 
 def split_terms(terms: Terms) -> tuple[TracedLobe | None, Terms]:
     """Split the terms of a material into narrow ones, None for none, and the others. terms: of a complete look"""
-    samplings = list(map(_round_lobe, terms))
+    samplings = [_round_lobe(FrozenTerm.from_document(term)) for term in terms]
     narrow = [term for term, sampling in zip(terms, samplings, strict=True) if sampling is not None]
     if not narrow:
         return None, terms

@@ -22,6 +22,7 @@ from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe
 from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
+from relume.transport.shading_points import ShadingPoints
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
@@ -51,15 +52,15 @@ class FewLobeRays:
     def _environments(self) -> PrefilteredEnvironments:
         return PrefilteredEnvironments(self.light_transport)
 
-    def _scene(self, light: Illumination, is_canceled: CancelCheck = lambda: False) -> LobeScene:
-        """Return the surfaces that rays meet, cached. light: the illumination. is_canceled: polled"""
+    def _outgoing(self, light: Illumination, is_canceled: CancelCheck = lambda: False) -> OutgoingLight:
+        """Return the outgoing light of patches, cached. light: the illumination. is_canceled: polled"""
         transport = self.light_transport
         return transport.cache.transient.get_value(
-            self._scene_key(light), lambda: transport.lobe_scene(light, is_canceled)
+            self._outgoing_key(light), lambda: transport.lobe_scene(light, is_canceled).outgoing
         )
 
-    def _scene_key(self, light: Illumination) -> tuple[Hashable, ...]:
-        return self.light_transport.key, "scene of lobe rays", light
+    def _outgoing_key(self, light: Illumination) -> tuple[Hashable, ...]:
+        return self.light_transport.key, "patch light of lobe rays", light
 
     def environment(self, light: Illumination) -> PrefilteredEnvironment:
         """Return the environment behind a scene, cached. light: the illumination"""
@@ -74,36 +75,30 @@ class FewLobeRays:
     def is_prepared(self, light: Illumination) -> bool:
         """Return whether `shade` has all that takes longer than a frame. light: the illumination"""
         has_environment = self._environments.has_environment_lookup(light.environment.map)
-        return has_environment and self.light_transport.cache.transient.contains(self._scene_key(light))
+        return has_environment and self.light_transport.cache.transient.contains(self._outgoing_key(light))
 
     def prepare(self, light: Illumination, is_canceled: CancelCheck) -> None:
         """Cache all that `shade` needs besides rays. light: the illumination. is_canceled: polled"""
         self.environment(light)
-        self._scene(light, is_canceled)
+        self._outgoing(light, is_canceled)
 
     def shade(
         self,
         samples: Samples,
+        receivers: ShadingPoints,
         view: View,
         material: int,
         light: Illumination,
         patch_light: Illumination,
         document: Mapping[str, Any],
     ) -> Shaped[F32, "n 3"] | None:
-        """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
-
-        Args:
-            samples: all samples of a material of a view. view, material: the view, and the index.
-            light: the illumination. patch_light: a similar one, for which this is prepared. document: the term.
-        """
+        """Return the radiance of samples for a white term; None if its lobe is wide. See `LobeShader`."""
         traced, _ = split_terms([{**document, "color": [1.0] * 3, "texture": None}])
         if traced is None:
             return None
-        receivers = samples.receivers(is_lit=False)
         image = self._image_points(view, material)
         footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
-        outgoing = self._scene(patch_light).outgoing
-        scene = self.light_transport.lobe_scene(light, lambda: False, outgoing)
+        scene = self.light_transport.lobe_scene(light, lambda: False, self._outgoing(patch_light))
         light_args = scene, self.environment(light), receivers, footprint
         rays_per_point = MAX_RAYS / max(int(np.count_nonzero(image.is_first)), 1)
         ray_args = traced, image, rays_per_point, local_rays

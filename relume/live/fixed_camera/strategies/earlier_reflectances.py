@@ -82,8 +82,8 @@ def _trace_lobe(
     """Return the image of a narrow term by few rays a sample. patch_light: whose light of patches is known"""
     images, material, live = target
     samples = images.transfer.samples(images.view, material.index, images.cache)
-    light_args = light, patch_light, live.document
-    rows = images.transfer.few_lobe_rays.shade(samples, images.view, material.index, *light_args)
+    sample_args = samples, images.unlit_samples(material), images.view, material.index
+    rows = images.transfer.few_lobe_rays.shade(*sample_args, light, patch_light, live.document)
     assert rows is not None  # its lobe is narrow
     if live.view_factor is not None:
         rows /= np.maximum(live.view_factor.T, np.float32(1e-6))
