@@ -14,7 +14,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
-from relume.raytrace.surface_interaction import triplanar_axes
+from relume.raytrace.surface_interaction import triplanar_uvs
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Texture
 
@@ -76,9 +76,8 @@ def mapped_uvs(
     """Return texture coordinates of corners; those of tri-planar mapping for triangles without area in UV space."""
     (du_0, dv_0), (du_1, dv_1) = ((uvs[:, k] - uvs[:, 0]).T for k in (1, 2))
     is_flat = (du_0 * dv_1 == dv_0 * du_1)[:, None, None]
-    u_axis, v_axis = triplanar_axes(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    u, v = np.einsum("fkc,fc->fk", corners, u_axis), -np.einsum("fkc,fc->fk", corners, v_axis)
-    return np.where(is_flat, np.stack([u, v], axis=-1), uvs).astype(np.float32)
+    face_normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.where(is_flat, triplanar_uvs(corners, face_normal), uvs).astype(np.float32)
 
 
 def _division(n: int) -> Shaped[F32, "pieces 3 3"]:

@@ -211,6 +211,17 @@ def triplanar_axes(
     return u_axis, np.cross(sign[:, None] * np.eye(3)[axis], u_axis)
 
 
+def triplanar_uvs(points: Shaped[F32, "faces 3 3"], face_normal: Shaped[F32, "faces 3"]) -> Shaped[F32, "faces 3 2"]:
+    """Texture coordinates of tri-planar mapping at the corners of triangles, one repeat per meter.
+
+    Args:
+        points: the corners, meters. face_normal: of any length.
+    """
+    u_axis, v_axis = triplanar_axes(face_normal)
+    uv = np.einsum("fkc,fc->fk", points, u_axis), -np.einsum("fkc,fc->fk", points, v_axis)
+    return np.stack(uv, axis=-1).astype(np.float32)
+
+
 def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32, sides: F32) -> F32:
     """Texture coordinates of tri-planar mapping, one repeat per meter; see `SurfaceInteraction.uv`.
 

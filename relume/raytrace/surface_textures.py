@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relume.brdf.texture_slots import TEXTURES, EmissionImage, NormalMap
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.images.image_store import load_emission_image, load_normal_map, load_texture
-from relume.raytrace.surface_interaction import triplanar_axes
+from relume.raytrace.surface_interaction import triplanar_uvs
 from relume.raytrace.texture import MipMap
 from relume.scene.model import WRAPS, Scene, Texture
 from relume.store.bake_protocol import StoreReader
@@ -230,10 +230,8 @@ def project_missing(
     flat = np.flatnonzero((coordinates.scale == 0) & is_needed)
     if not len(flat):
         return coordinates
-    across, up = triplanar_axes(face_normal[flat])
-    points = positions[corners[flat]]
-    u, v = np.einsum("fkc,fc->fk", points, across), -np.einsum("fkc,fc->fk", points, up)
-    uvs = np.concatenate([coordinates.uvs, np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32)])
+    projected = triplanar_uvs(positions[corners[flat]], face_normal[flat])
+    uvs = np.concatenate([coordinates.uvs, projected.reshape(-1, 2)])
     faces, scale = coordinates.faces.copy(), coordinates.scale.copy()
     faces[flat] = len(coordinates.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
     scale[flat] = 1
