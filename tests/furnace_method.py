@@ -20,7 +20,8 @@ from relume.assets.environments.equirect import texel_solid_angles
 from relume.brdf.lobe_sampling import LobeSampling
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, LightsAndPoints, Samples
-from relume.live.opened.fixed_views import BakedFixedViews, SelectedSamples
+from relume.live.opened.fixed_views import BakedFixedViews
+from relume.live.opened.samples import SelectedSamples
 from relume.methods.store_layout import SHARD_ROWS
 from relume.methods.view_stages import CHUNK_ROWS, SampledViews
 from relume.patches.gather_hits import trace_gather_rays

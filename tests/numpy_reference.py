@@ -239,8 +239,12 @@ def shade_view(transfer, view: View, look):
             lights, receivers = incident if lobe is None else trace_lobe_light(transfer, view, index, look, lobe)
             term = TERMS[document["model"]].normalized(document)
             bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
-            projector = Projector(term, contract(term, bands, None), lights, receivers)
-            image = projector.project(level_rows.start, level_rows.stop)[:, 0].astype(float) * document["color"]
+            contraction = contract(term, bands, None)
+            projector = Projector(term, contraction, lights, receivers)
+            image = projector.project(level_rows.start, level_rows.stop)[:, 0]
+            if lobe is not None:
+                image = average_split_samples(transfer, view, index, look, lobe, level_rows, image, term, contraction)
+            image = image.astype(float) * document["color"]
             texture = view.textures[index].get(document["texture"])
             if texture is not None:
                 image *= texture[level_rows]
@@ -253,6 +257,27 @@ def shade_view(transfer, view: View, look):
         background = transfer.background_in(look.environment.key, view)
         out[view.num_surface_samples :] = np.array(look.environment.gain) * background
     return out
+
+
+def average_split_samples(transfer, view: View, index, look, lobe, level_rows, image, term, contraction):
+    """The image of a level's samples, with the mean over the points of those that are split. (n, 3)
+
+    The samples are chosen among those of the level alone, unless an image of all levels has chosen them before.
+    """
+    light = illumination_from_look(look, transfer.material_names, has_bounces=EditAxis.BOUNCES in transfer.axes)
+    light = light._replace(environment_gain=look.environment.gain)
+    radiance = np.zeros((view.rows(index).stop - view.rows(index).start, 3), np.float32)
+    radiance[level_rows] = image
+    split = transfer.split_light(view, index, light, lobe, radiance, lambda: False)
+    if split is None:
+        return image
+    ends, image = np.append(split.first, split.points.points.num_points), image.copy()
+    projector = Projector(term, contraction, split.lights, split.points)
+    for k, row in enumerate(split.rows):
+        if level_rows.start <= row < level_rows.stop:
+            at_points = projector.project(ends[k], ends[k + 1])[:, 0].astype(float)
+            image[row - level_rows.start] = at_points.mean(axis=0)
+    return image
 
 
 def split_by_roughness_level(view: View, index, terms):

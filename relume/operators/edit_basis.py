@@ -16,6 +16,7 @@ from relume.math.daubechies import analysis, forward
 from relume.operators.linear_operator import LinearOperator, level_bounds, pack_columns
 from relume.transport.roughness_ranges import contract_levels, project_levels, without_free_curves
 from relume.transport.shading_points import ShadingPoints
+from relume.transport.split_light import SplitLight
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -118,15 +119,19 @@ def precompute(
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
     bits: int = 32,
+    split: SplitLight | None = None,
 ) -> LinearOperator:
     """Precompute the operator of a term along a basis, at all receivers.
 
     Args:
         basis: the free coefficients. term, bands, lights, receivers: see `EditBasis.columns`.
         progress: called with the completed fraction. is_canceled: polled. bits: see `Compression`.
+        split: light at receivers that are split into points.
     Raises:
         CancelledError: `is_canceled` returned True.
     """
     bounds = level_bounds(receivers, bands, basis.affected_curves)
     columns = basis.columns(term, bands, lights, receivers)
+    if split is not None:
+        columns = split.averaged(columns, basis.columns(term, bands, split.lights, split.points))
     return pack_columns(columns, basis.num_columns, receivers, bounds, progress, is_canceled, bits)

@@ -57,9 +57,9 @@ class LobeEnvironment(NamedTuple):
 
     Attributes:
         radiance: equirectangular map, top row first, times its gain; empty for no light.
-        tile: triangle of each texel.
+        tile: triangle of each texel, −1 if it does not share its light with rays.
         rotation: cosine and sine of the map's rotation about +Y.
-        direction, radius, solid_angle: of the triangles.
+        direction, radius, solid_angle: of the triangles that share their light.
         texels, levels: the map without its peaks, at halved sizes down to one row; begin, height and width of each.
         is_direct: rays that leave the scene at once bring its light; others always do.
     """
@@ -241,7 +241,9 @@ def _from_environment(environment, pattern, level, spread, frame, world, jitter,
     t, b, n = frame
     height, width = environment.tile.shape
     row, column = _texel(environment.rotation, height, width, world, jitter)
-    tile = environment.tile[row, column]
+    tile, texel = environment.tile[row, column], environment.radiance[row, column]
+    if tile < 0:
+        return texel[0], texel[1], texel[2]
     d = environment.direction[tile]
     share = _triangle_share(
         pattern, level, environment.radius[tile], environment.solid_angle[tile], spread,
@@ -250,8 +252,8 @@ def _from_environment(environment, pattern, level, spread, frame, world, jitter,
         n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
         o[0], o[1], o[2],
     )  # fmt: skip
-    radiance, rest = environment.radiance, _ONE - share
-    return rest * radiance[row, column, 0], rest * radiance[row, column, 1], rest * radiance[row, column, 2]
+    rest = _ONE - share
+    return rest * texel[0], rest * texel[1], rest * texel[2]
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")

@@ -66,7 +66,8 @@ def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotat
         no_paths(len(normal)),
     )
     tile = tile_of_texels(tiles, radiance.shape[:2], rotation)
-    environment = lobe_environment(radiance, tile, rotation, lights, radiance, is_direct=True)
+    every = np.arange(lights.num_lights)
+    environment = lobe_environment(radiance, tile, rotation, lights, radiance, every, is_direct=True)
     patches = no_light(), untextured(no_light())
     rays = LobeRays(hits, pattern, *patches, environment, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS, NO_EMISSION)
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.store.bake_protocol import StoreReader
     from relume.transport.lobe_hits import LobeHits
     from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
+    from relume.transport.split_light import SplitLight
     from relume.views.map_override_store import RayTracer
     from relume.views.view import View
 
@@ -308,6 +309,25 @@ class FixedViewTransfer(OpenBake, Protocol):
             is_canceled: polled regularly.
             lobe: of the one term that is lit, along which rays are traced; None: light from everywhere.
             patch_light: whose light of patches lobe rays bring; None: of `light`.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
+        ...
+
+    def split_light(
+        self,
+        view: View,
+        material: int,
+        light: Illumination,
+        lobe: LobeSampling,
+        radiance: Shaped[F32, "n 3"],
+        is_canceled: Callable[[], bool],
+    ) -> SplitLight | None:
+        """Return the light at samples in whose pixels the highlight of a term varies; None if there are none.
+
+        Args:
+            view, material: whose samples they are. light: the illumination. lobe: of the term, narrow.
+            radiance: of the term at all samples of the material. is_canceled: polled.
         Raises:
             CancelledError: `is_canceled` returned true.
         """

@@ -45,6 +45,7 @@ from relume.operators.linear_operator import LinearOperator
 from relume.operators.parameter_operator import linearize
 from relume.operators.shade import ShadedTerm, shaded_bytes
 from relume.transport.shading_points import ShadingPoints
+from relume.transport.split_light import SplitLight
 from relume.views.map_override import MapOverrides, with_overrides
 from relume.views.view import Tile
 
@@ -198,6 +199,17 @@ class ViewImages:
         """Return the incident light at the samples of a material. See `FixedViewTransfer.incident_light`."""
         samples = self.transfer.samples(self.view, material.index, self.cache)
         return self.transfer.incident_light(samples, light, quality, is_canceled, lobe, patch_light)
+
+    def split_light(
+        self,
+        material: MaterialImage,
+        light: Illumination,
+        lobe: LobeSampling,
+        radiance: Shaped[F32, "n 3"],
+        is_canceled: Callable[[], bool],
+    ) -> SplitLight | None:
+        """Return the light at samples of a material that are split. See `FixedViewTransfer.split_light`."""
+        return self.transfer.split_light(self.view, material.index, light, lobe, radiance, is_canceled)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""

@@ -22,7 +22,6 @@ from relume.core.digest import digest
 from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
-from relume.lights.local_lights import num_samples
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
@@ -34,6 +33,7 @@ from relume.live.opened.lobe_light import (
     HitImages,
     LobePatches,
     LobeTracer,
+    bright_triangles,
     choose_peaks,
     hit_images,
     lobe_environment,
@@ -43,22 +43,25 @@ from relume.live.opened.lobe_light import (
     tile_of_texels,
     trace_lobes,
 )
-from relume.live.opened.local_lights import LocalLights, ShadowCache
+from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.retrace import NormalRetracer
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
+from relume.live.opened.samples import MaterialSamples, SelectedSamples
+from relume.live.opened.split_samples import SampleSplitter
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility import select_visibility
 from relume.store.bake_protocol import StoreReader
-from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
 from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight, no_light
-from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
+from relume.transport.shading_points import GatherRays, RayList, ShadingPoints
+from relume.transport.split_light import SplitLight
 from relume.views.downsampled import DownsampledStore
 from relume.views.frost_filter import GLOW_WIDTH, MAX_FROSTED_RATIO, RAY_SPACING
-from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
@@ -246,13 +249,29 @@ class BakedFixedViews:
         receivers = samples.receivers(is_lit=lights.num_lights > 0)
         rays: list[RayList] = []
         if lobe is not None:
-            lights = lights.ungrouped()
+            lights, receivers = self._share_with_rays(lights.ungrouped(), receivers, light, lobe)
             rays.append(self._lobe_rays(samples, receivers, light, lobe, quality, is_canceled, patch_light))
         if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
             gather_rays = self._gather_rays(samples, light, quality, is_canceled)
             rays.extend(gather_rays if lobe is None else (only_broad(each, receivers, lobe) for each in gather_rays))
         rays += [*self._mirror_rays(samples, light), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
+
+    def _share_with_rays(
+        self, lights: TriangleLights, receivers: ShadingPoints, light: Illumination, lobe: LobeSampling
+    ) -> LightsAndPoints:
+        """Return the environment triangles that share their light with lobe rays, and their visibility."""
+        shared = self._shared_triangles(light, lobe)
+        if not lights.num_lights or len(shared) == lights.num_lights:
+            return lights, receivers
+        every_row = np.arange(receivers.points.num_points)
+        visible = select_visibility(receivers.visible, every_row, shared)
+        return lights.select(shared, lights.irradiance[shared]), replace(receivers, visible=visible)
+
+    def _shared_triangles(self, light: Illumination, lobe: LobeSampling) -> NDArray[np.intp]:
+        """Return the triangles that share their light with rays: all, if wide levels have no rays."""
+        lights = self.environment_lights(light.environment, LightQuality.EXACT)
+        return bright_triangles(lights) if lobe.is_narrow.all() else np.arange(lights.num_lights)
 
     def _lobe_rays(
         self,
@@ -271,9 +290,32 @@ class BakedFixedViews:
         outgoing = None if patch_light is None else self._patch_light(patch_light, is_canceled)
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled, outgoing)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
-        environment, peaks = self._lobe_environment(light) if light.has_environment else (NO_ENVIRONMENT, NO_PEAKS)
+        environment, peaks = NO_ENVIRONMENT, NO_PEAKS
+        if light.has_environment:
+            environment, peaks = self._lobe_environment(light, self._shared_triangles(light, lobe))
         light_args = scene.outgoing, scene.textured, environment, scene.broad_share
         return LobeRays(hits, pattern, *light_args, footprint, scene.surfaces, peaks, scene.emission)
+
+    def split_light(
+        self,
+        view: View,
+        material: int,
+        light: Illumination,
+        lobe: LobeSampling,
+        radiance: Shaped[F32, "n 3"],
+        is_canceled: Callable[[], bool],
+    ) -> SplitLight | None:
+        """Return the light at samples in whose pixels a highlight varies. See `FixedViewTransfer`."""
+        return SampleSplitter(self).light(view, material, light, lobe, radiance, is_canceled)
+
+    @cached_property
+    def shaded_geometry(self) -> SceneBuffers:
+        """The triangles with the normals of their corners, without tangents and textures; a store may lack them."""
+        geometry, normals = self.tracer.geometry, self.lobe_tracer.normals
+        num = len(normals)
+        return replace(
+            geometry, normals=normals, tangents=np.zeros((num, 4), np.float32), uvs=np.zeros((num, 2), np.float32)
+        )
 
     @cached_property
     def few_lobe_rays(self) -> FewLobeRays:
@@ -317,7 +359,8 @@ class BakedFixedViews:
         """Return the textures and reflectances of patches, for lobe rays: there are none."""
         return no_lobe_patches()
 
-    def _lobe_environment(self, light: Illumination) -> tuple[LobeEnvironment, LobePeaks]:
+    def _lobe_environment(self, light: Illumination, shared: NDArray[np.intp]) -> tuple[LobeEnvironment, LobePeaks]:
+        """Return the environment for lobe rays. shared: triangles that share their light with them"""
         key, rotation = light.environment, light.environment.rotation
         radiance, lights = self.environment_map(key.map), self.environment_lights(key, LightQuality.EXACT)
         tile = self.cache.get_value(
@@ -329,10 +372,11 @@ class BakedFixedViews:
             gain = np.array(light.environment_gain, np.float32)
             weighted = radiance if np.all(gain == 1) else radiance * gain
             peaks, irradiance, without_peaks = choose_peaks(weighted, tile, lights)
-            environment = lobe_environment(weighted, tile, rotation, lights, without_peaks, is_direct=is_direct)
+            map_args = weighted, tile, rotation, lights, without_peaks, shared
+            environment = lobe_environment(*map_args, is_direct=is_direct)
             return environment, LobePeaks(lights.direction[peaks], irradiance, self._patch_visibility(peaks))
 
-        cache_key = self.key, "lobe environment", key, light.environment_gain, is_direct
+        cache_key = self.key, "lobe environment", key, light.environment_gain, is_direct, len(shared)
         return self.cache.transient.get_value(cache_key, compute)
 
     def _patch_visibility(self, lights: Shaped[NDArray[np.intp], " K"]) -> Shaped[F32, "patches K"]:
@@ -416,108 +460,6 @@ class BakedFixedViews:
             return prefiltered(self.cache.get_value((owner, "downsampled environment", name), downsample), degrees)
 
         return self.cache.transient.get_value((owner, "blurred environment", name, degrees), prefilter)
-
-
-@dataclass(frozen=True)
-class MaterialSamples:
-    """All samples of a material, read when they are lit.
-
-    Attributes:
-        view: the view. material: index of the material. local: casts the shadows of local lights.
-        cache: cache of these shadows. key: key of the samples in it.
-    """
-
-    view: View
-    material: int
-    local: LocalLights
-    cache: Cache
-    key: tuple[Hashable, ...]
-
-    num_bytes = 0
-
-    def receivers(self, *, is_lit: bool) -> ShadingPoints:
-        """Read the samples without rays. is_lit: with the visibility of the environment."""
-        return self.view.receivers(self.material, is_lit=is_lit)
-
-    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays:
-        """Read the gather rays, without light; missing ones are traced."""
-        rows = self.view.rows(self.material)
-        if rows.start < rows.stop:
-            self.view.trace_gather_rays(self.material, is_canceled)
-        return self.view.gather_rays(self.material)
-
-    @property
-    def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"]:
-        """The virtual lights that the samples see in planar mirrors."""
-        return self.view.mirror_lights(self.material)
-
-    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
-        """Return the change of normals and view directions in pixels. See `Samples`."""
-        view = self.view
-
-        def compute() -> F32:
-            return pixel_footprint(view.pixel[view.rows(self.material)], view.width, receivers.points, receivers.wo)
-
-        return self.cache.transient.get_value((*self.key, "pixel footprint"), compute)
-
-    def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
-        """Return the hits of lobe rays, cached until the memory is needed."""
-        return self.cache.transient.get_value((*self.key, "lobe hits", key), trace)
-
-    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
-        """Return the rays of local lights, with cached shadows. points: the samples"""
-
-        def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
-            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
-            return self.cache.get(
-                (*self.key, "shadows", geometry), ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points)
-            )
-
-        return self.local.rays_to(light, points, cached_shadows)
-
-
-@dataclass(frozen=True)
-class SelectedSamples:
-    """Some points, read once to be lit quickly.
-
-    Attributes:
-        points: without rays. local: casts the shadows of local lights.
-        stored_rays: their gather rays without light; None for none.
-        mirror_visibility: the virtual lights that they see in planar mirrors; None for none.
-    """
-
-    points: ShadingPoints
-    local: LocalLights
-    stored_rays: GatherRays | None = None
-    mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory in use."""
-        points, hit_bytes = self.points, 0 if self.stored_rays is None else self.stored_rays.gather_hits.nbytes
-        return int(
-            2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
-        )
-
-    def receivers(self, *, is_lit: bool) -> ShadingPoints:
-        """Return the points without rays."""
-        return self.points
-
-    def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
-        """Return the gather rays, without light."""
-        return self.stored_rays
-
-    def pixel_footprint(self, receivers: ShadingPoints) -> Shaped[F32, "#n 2 2 3"]:
-        """Return no change within a pixel: the points are not neighbors."""
-        return NO_FOOTPRINT
-
-    def lobe_hits(self, key: Hashable, trace: Callable[[], LobeHits]) -> LobeHits:
-        """Return the hits of lobe rays."""
-        return trace()
-
-    def local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
-        """Return the rays of local lights; shadows are traced."""
-        return self.local.rays_to(light, points)
 
 
 def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:

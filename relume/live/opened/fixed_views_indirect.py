@@ -15,7 +15,7 @@ from relume.brdf.albedo import Reflectances
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
-from relume.live.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples, read_fields
+from relume.live.opened.fixed_views import BakedFixedViews, FindLights, read_fields
 from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import LobePatches, broad_share
@@ -23,6 +23,7 @@ from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.live.opened.planar_mirror_light import MirrorLightTransfer
 from relume.live.opened.retrace import NormalRetracer
+from relume.live.opened.samples import SelectedSamples
 from relume.live.opened.stored_patches import read_patches
 from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches

@@ -52,7 +52,7 @@ from relume.transport.shading_points import GatherRays, ShadingPoints
 F32 = NDArray[np.float32]
 
 _ALBEDO_STEPS = 64
-_PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
+_PEAK, _MAX_PEAKS, _MAX_SHARED = 8, 32, 256  # brightness of peaks by the mean, and their number
 _MAX_LOBES = 255
 _WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
@@ -153,7 +153,7 @@ class LobeTracer:
         return LobeSurfaces(
             faces=geometry.faces,
             face_material=geometry.face_material,
-            normals=self._normals,
+            normals=self.normals,
             lobe=row,
             quantile=quantile,
             band_density=band_density,
@@ -206,7 +206,7 @@ class LobeTracer:
         return glass
 
     @cached_property
-    def _normals(self) -> F32:
+    def normals(self) -> F32:
         """Normals of the corners; empty for a store that lacks them."""
         try:
             return np.asarray(self._store.read("scene/normals"), np.float32)
@@ -345,12 +345,24 @@ def choose_peaks(
     return peaks, irradiance[peaks].astype(np.float32), np.where(is_peak[tile][..., None], limited, radiance)
 
 
+def bright_triangles(lights: TriangleLights) -> NDArray[np.intp]:
+    """Return the triangles of an environment whose light is shared between them and lobe rays, ascending.
+
+    All other light comes along rays. The sum is the light in any case: this decides where its noise is least.
+    """
+    power = lights.irradiance.sum(axis=1)
+    radiance = power / np.maximum(lights.solid_angle, 1e-12)
+    bright = np.flatnonzero(radiance > _PEAK * power.sum() / (4 * np.pi))
+    return np.sort(bright[np.argsort(-power[bright], kind="stable")[:_MAX_SHARED]])
+
+
 def lobe_environment(
     radiance: Shaped[F32, "height width 3"],
     tile: Shaped[NDArray[np.int32], "height width"],
     rotation: float,
     lights: TriangleLights,
     without_peaks: Shaped[F32, "height width 3"],
+    shared: NDArray[np.intp],
     *,
     is_direct: bool,
 ) -> LobeEnvironment:
@@ -358,7 +370,8 @@ def lobe_environment(
 
     Args:
         radiance: the map, times its gain. tile: from `tile_of_texels`. rotation: degrees. lights: its triangles.
-        without_peaks: from `choose_peaks`. is_direct: as in `LobeEnvironment`.
+        without_peaks: from `choose_peaks`. shared: triangles that share their light with rays.
+        is_direct: as in `LobeEnvironment`.
     """
     cosine_sine = np.array([np.cos(np.radians(rotation)), np.sin(np.radians(rotation))], np.float32)
     images = _halved(np.ascontiguousarray(without_peaks, np.float32))
@@ -366,6 +379,8 @@ def lobe_environment(
     sizes = shapes.prod(axis=1)
     levels = np.column_stack([np.cumsum(sizes) - sizes, shapes])
     texels = np.concatenate([image.reshape(-1, 3) for image in images])
-    light_args = lights.direction, lights.radius, lights.solid_angle
-    arrays = np.ascontiguousarray(radiance, np.float32), tile, cosine_sine
+    light_args = lights.direction[shared], lights.radius[shared], lights.solid_angle[shared]
+    row = np.full(lights.num_lights, -1, np.int32)
+    row[shared] = np.arange(len(shared))
+    arrays = np.ascontiguousarray(radiance, np.float32), row[tile], cosine_sine
     return LobeEnvironment(*arrays, *light_args, texels, levels.astype(np.int64), is_direct)

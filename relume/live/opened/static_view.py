@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-from relume.live.opened.fixed_views import SelectedSamples
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import LobeTracer
 from relume.live.opened.local_lights import LocalLights
+from relume.live.opened.samples import SelectedSamples
 from relume.methods.gather import GatherMethod
 from relume.operators.image_cache import ImageFiles
 from relume.scene.custom_camera import with_cameras

@@ -19,7 +19,9 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.view_images import MERGED_LIGHT_SUFFIX, TermTarget
 from relume.operators.edit_basis import EditBasis, precompute
 from relume.operators.linear_operator import Compression, LinearOperator
+from relume.operators.shade import ShadedTerm
 from relume.transport.shading_points import ShadingPoints
+from relume.transport.split_light import SplitLight
 
 F64 = NDArray[np.float64]
 
@@ -75,14 +77,25 @@ class OperatorPrecompute:
         def build_operator() -> LinearOperator:
             lights, receivers = images.incident_light(material, self.light, is_canceled, quality, self.lobe)
 
+            split = self._split_light(is_canceled)
+
             def precompute_at(samples: ShadingPoints) -> LinearOperator:
-                return precompute(self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits)
+                args = self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits
+                return precompute(*args, split if samples is receivers else None)
 
             if step > 1:
                 return precompute_subsampled(images.view, material.index, step, receivers, precompute_at)
             return replace(precompute_at(receivers), has_merged_lights=has_merged_lights)
 
         return images.cache.get(self.key, LinearOperator, self.num_bytes, build_operator)
+
+    def _split_light(self, is_canceled: CancelCheck) -> SplitLight | None:
+        """Return the light at the samples that the exact image splits; None for none."""
+        images, material, live = self.target
+        if self.lobe is None or not live.ready.is_converged:
+            return None
+        radiance = ShadedTerm(live.ready.image).rows(material.num_samples)
+        return images.split_light(material, self.light, self.lobe, radiance, is_canceled)
 
     def apply(self, result: LinearOperator) -> None:
         """Use the operator, only if its fixed curves are still those of the target.

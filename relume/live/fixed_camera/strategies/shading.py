@@ -20,7 +20,7 @@ from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCa
 from relume.live.fixed_camera.strategies.texel_sum import is_cacheable, put_texel_light
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.look.model import Rgb
-from relume.operators.shade import PartialImage, ShadedTerm, shaded_bytes
+from relume.operators.shade import PartialImage, ShadedTerm, shade, shaded_bytes
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -122,9 +122,23 @@ class Shading:
         self, key: tuple[Hashable, ...], light: Illumination, progress: ProgressCallback, is_canceled: CancelCheck
     ) -> ShadedTerm:
         """Complete the image in a light from its partial result."""
-        shaded = ShadedTerm.from_rows(self._partial_rows(key, light, progress, is_canceled, None))
+        rows = self._partial_rows(key, light, progress, is_canceled, None)
+        shaded = ShadedTerm.from_rows(self._with_split_samples(rows, light, is_canceled))
         self.target.images.cache.evict((*key, _PARTIAL_SUFFIX))
         return shaded
+
+    def _with_split_samples(self, rows: F32, light: Illumination, is_canceled: CancelCheck) -> F32:
+        """Return the image in a light, with the mean over the pixel where the highlight varies within it. (n, 3)"""
+        images, material, _ = self.target
+        if self.lobe is None:
+            return rows
+        split = images.split_light(material, light, self.lobe, rows, is_canceled)
+        if split is None:
+            return rows
+        at_points = shade(self.term, self.bands, split.lights, split.points, lambda fraction: None, is_canceled)
+        averaged = rows.copy()
+        averaged[split.rows] = split.mean(at_points.rows(split.points.points.num_points))
+        return averaged
 
     def _partial_rows(
         self,
