@@ -151,7 +151,7 @@ def _ray_spacing(pattern, level, spread):  # type: ignore[no-untyped-def]
     Args:
         pattern, level: of the point. spread: from `half_vector_spread`.
     """
-    median = angle_at_quantile(pattern.quantile, level, _HALF)
+    median = angle_at_quantile(pattern.quantile, level * pattern.angles.shape[0], _HALF)
     radius = _TWO * median if pattern.is_half_angle else median
     return (_ROOT_TWO_PI * radius + _TWO * spread) / np.float32(math.sqrt(pattern.uv.shape[0]))
 

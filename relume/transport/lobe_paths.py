@@ -140,9 +140,7 @@ class LobeSurfaces(NamedTuple):
     @property
     def max_entries(self) -> int:
         """Largest number of entries of a ray in `LobePaths`."""
-        num_reflections = MAX_REFLECTIONS if len(self.quantile) else 0
-        num_sides = _MAX_SIDES if len(self.glass) else 0
-        return num_reflections + num_sides + 1 if num_reflections + num_sides else 0
+        return MAX_REFLECTIONS + _MAX_SIDES + 1 if len(self.quantile) or len(self.glass) else 0
 
 
 NO_SURFACES = LobeSurfaces(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -40,6 +40,7 @@ from relume.live.opened.lobe_light import (
     narrow_surfaces,
     no_lobe_patches,
     only_broad,
+    reflects_narrowly,
     tile_of_texels,
     trace_lobes,
 )
@@ -254,8 +255,15 @@ class BakedFixedViews:
         if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
             gather_rays = self._gather_rays(samples, light, quality, is_canceled)
             rays.extend(gather_rays if lobe is None else (only_broad(each, receivers, lobe) for each in gather_rays))
-        rays += [*self._mirror_rays(samples, light), *samples.local_rays(light, receivers.points)]
+        followed = self._followed_materials(light) if lobe is not None and lobe.is_narrow.all() else ()
+        rays += [*self._mirror_rays(samples, light, followed), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
+
+    @staticmethod
+    def _followed_materials(light: Illumination) -> list[int]:
+        """Return the materials from which lobe rays go on."""
+        reflectances = light.reflectances if light.paths.has_all_bounces else ()
+        return [index for index, each in enumerate(reflectances) if reflects_narrowly(each)]
 
     def _share_with_rays(
         self, lights: TriangleLights, receivers: ShadingPoints, light: Illumination, lobe: LobeSampling
@@ -393,7 +401,7 @@ class BakedFixedViews:
         """Return the rays that carry indirect illumination to samples: none was baked."""
         return ()
 
-    def _mirror_rays(self, samples: Samples, light: Illumination) -> tuple[RayList, ...]:
+    def _mirror_rays(self, samples: Samples, light: Illumination, followed: Collection[int]) -> tuple[RayList, ...]:
         """Return the rays from virtual lights in planar mirrors: none was baked."""
         return ()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -150,10 +150,13 @@ class BakedIndirectViews(BakedFixedViews):
         reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
         return (replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled)),)
 
-    def _mirror_rays(self, samples: Samples, light: Illumination) -> tuple[RayList, ...]:
-        """Return the rays from virtual lights in planar mirrors."""
+    def _mirror_rays(self, samples: Samples, light: Illumination, followed: Collection[int]) -> tuple[RayList, ...]:
+        """Return the rays from virtual lights in planar mirrors, but not in those that lobe rays follow."""
         mirror_light = self.mirror_light
         if mirror_light is None or not light.paths.has_indirect or not mirror_light.is_in(light):
             return ()
         visible = samples.mirror_visibility
-        return () if visible is None else (mirror_light.virtual_lights(light).rays(visible),)
+        if visible is None:
+            return ()
+        virtual_lights = mirror_light.virtual_lights(light).beside(mirror_light.of_materials(followed))
+        return (virtual_lights.rays(visible),)

@@ -53,7 +53,7 @@ F32 = NDArray[np.float32]
 
 _ALBEDO_STEPS = 64
 _PEAK, _MAX_PEAKS, _MAX_SHARED = 8, 32, 256  # brightness of peaks by the mean, and their number
-_MAX_LOBES = 255
+_MAX_LOBES, _LEAST_ALBEDO = 255, 0.15  # of the materials from which rays go on
 _WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
 _PREVIEW_RAYS, _NARROW_RAYS, _LOBE_RAYS = 34, 144, 233  # of a sample, Fibonacci numbers
@@ -240,11 +240,19 @@ def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "step
 
 @lru_cache(maxsize=64)
 def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
-    """Return the lobe of a material whose highlights are narrow and strong, and their terms; None for others."""
-    lobes = (sample_lobe(document, NO_LEVELS) for document in reflectance.lobes)
+    """Return the first lobe of a material whose narrow highlights are strong, and their terms; None for others."""
+    lobes = ((document, sample_lobe(document, NO_LEVELS)) for document in reflectance.lobes)
     # tangents are unknown at hits
-    narrow = next((lobe for lobe in lobes if lobe is not None and lobe.is_round), None)
-    return None if narrow is None else (narrow, reflectance.lobes)
+    narrow = [(document, lobe) for document, lobe in lobes if lobe is not None and lobe.is_round]
+    documents = tuple(document for document, _ in narrow)
+    if _albedo(documents) < _LEAST_ALBEDO:
+        return None
+    return narrow[0][1], documents
+
+
+def _albedo(documents: Documents) -> float:
+    """Return the mean reflectance of highlights."""
+    return sum(float(quantized_reflectance(document)[:, 0].mean()) for document in documents)
 
 
 def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -> GatherRays:
@@ -289,11 +297,11 @@ def reflects_narrowly(reflectance: Reflectance) -> bool:
 
 def broad_share(reflectance: Reflectance) -> float:
     """Share of a material's reflectance that its narrow highlights do not have."""
-    if not reflects_narrowly(reflectance):
+    narrow = _narrow_lobe(reflectance)
+    if narrow is None:
         return 1.0
-    total = float(reflectance.matrix[:, :, 0].sum())
-    narrow = sum(float(quantized_reflectance(document)[:, 0].sum()) for document in reflectance.lobes)
-    return max(0.0, 1 - narrow / max(total, 1e-6))
+    total = float(reflectance.matrix[:, :, 0].sum(axis=0).mean())
+    return max(0.0, 1 - _albedo(narrow[1]) / max(total, 1e-6))
 
 
 def _no_patches(num_sides: int) -> PatchTree:

@@ -11,7 +11,7 @@ with the irradiance E of a group of lights in direction d, and the mirror's refl
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -49,6 +49,10 @@ class VirtualLights(NamedTuple):
     direction: Shaped[F32, "K 3"]
     normal_irradiance: Shaped[F32, "K 3"]
 
+    def beside(self, is_followed: Shaped[NDArray[np.bool_], " K"]) -> VirtualLights:
+        """Return the lights without those of mirrors from which lobe rays go on. is_followed: of each light"""
+        return self._replace(normal_irradiance=np.where(is_followed[:, None], np.float32(0), self.normal_irradiance))
+
     def rays(self, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
         """Return the rays to samples. visible: visibility of these lights, see `lights_visible_in_mirrors`"""
         return MirrorRays(self.direction, self.normal_irradiance, visible)
@@ -74,6 +78,11 @@ class MirrorLightTransfer:
         self._mirror_lights, self._patches, self._find_lights = mirror_lights, patches, find_lights
         self._cache, self._key = cache, key
         self._directions = mirrored_lights(mirror_lights.mirrors.normal, mirror_lights.direction).reshape(-1, 3)
+
+    def of_materials(self, materials: Collection[int]) -> Shaped[NDArray[np.bool_], " K"]:
+        """True for the virtual lights in mirrors of some materials."""
+        is_chosen = np.isin(self._mirror_lights.mirrors.material, list(materials))
+        return np.repeat(is_chosen, len(self._mirror_lights.direction))
 
     @staticmethod
     def is_in(light: Illumination) -> bool:
