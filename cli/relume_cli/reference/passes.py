@@ -103,10 +103,8 @@ def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: 
         transfer = open_cached(service.store_path(bake.id), lambda store: open_bake(store, Cache(4 << 30)))
         scene = load_registered_scene(service.data_dir, record.id)
         document = complete_look(partial, transfer.default_look).without_compositing()
-        static_views = (
-            StaticViewBuilder(transfer.light_transport, scene) if isinstance(transfer, BakedFreeCamera) else None
-        )
-        frame = render_image(transfer, view_name, document, static_views=static_views)
+        light_transport = transfer.light_transport if isinstance(transfer, BakedFreeCamera) else transfer
+        frame = render_image(transfer, view_name, document, static_views=StaticViewBuilder(light_transport, scene))
     scene = with_cameras(scene, [transfer.views[view_name].camera])
     size = frame.shape[1], frame.shape[0]
     return ComparisonSubject(scene, view_name, document, size, EditAxis.BOUNCES in transfer.axes, frame)
