@@ -62,10 +62,10 @@ class NormalMapLook(_FrozenModel):
 
 
 class GlassLook(_FrozenModel):
-    """Light through a surface of glass; what it reflects is its material's terms.
+    """Light through a surface of glass; its material's terms are what it reflects.
 
-    `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; thin
-    glass has none. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`:
+    `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; not
+    of thin glass. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`:
     index of refraction.
     """
 

@@ -73,9 +73,7 @@ def render_image(
 
 def needs_tracing(transfer: OpenBake, look: Look) -> bool:
     """Return whether the exact image of a look needs rays that the bake has not traced."""
-    if isinstance(transfer, BakedFreeCamera):
-        return True
-    return glass_of(look) != cast("FixedViewTransfer", transfer).glass
+    return isinstance(transfer, BakedFreeCamera) or glass_of(look) != transfer.glass
 
 
 def _pixels(picture: Picture | FreeCameraPicture, for_display: bool) -> NDArray[np.float32]:

@@ -19,6 +19,7 @@ from relume.core.errors import CancelledError, RelumeError, ResultUnavailableErr
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.protocols import FixedViewTransfer, StaticViewFactory
 from relume.look.glass import GlassOfLook
+from relume.look.model import GlassLook
 from relume.views.view import View
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 F32 = NDArray[np.float32]
 
-_MIN_COLOR = 1e-3  # darker glass is no measure of the light behind it
+_MIN_TRANSMITTANCE = 1e-3  # darker glass is no measure of the light behind it
 _MAX_RATIO = 100.0
 
 
@@ -152,20 +153,25 @@ class EditedGlass:
 def color_change(
     passages: GlassPassages, before: GlassOfLook, after: GlassOfLook, names: Sequence[str]
 ) -> Shaped[F32, "pixels 3"]:
-    """Return the factor (t' / t)^n e^(-(a' - a) s) of the light behind glass after a change of its color.
+    """Return the factor (t' / t)^n e^(-(a' - a) s) of the light behind glass after an edit of it.
 
     Args:
-        passages: glass in front of each pixel. before, after: glass of the same materials, t, a and t', a'.
-        names: names of the scene's materials.
+        passages: glass in front of each pixel, n and s. before, after: glass of the same materials, with transmittances
+            t and t' of a surface at normal incidence and absorption a and a'. names: names of the scene's materials.
     """
     out, edited = np.ones((len(next(iter(passages.count.values()), ())), 3)), dict(after)
     for name, glass in before:
         index = names.index(name)
         if index in passages.count and edited[name] != glass:
-            ratio = np.array(edited[name].color) / np.maximum(glass.color, _MIN_COLOR)
+            ratio = _transmittance(edited[name]) / np.maximum(_transmittance(glass), _MIN_TRANSMITTANCE)
             more = np.subtract(edited[name].absorption, glass.absorption)
             out *= ratio ** passages.count[index][:, None] * np.exp(-more * passages.length[index][:, None])
     return np.clip(out, 0, _MAX_RATIO).astype(np.float32)
+
+
+def _transmittance(glass: GlassLook) -> Shaped[NDArray[np.float64], " 3"]:
+    """Transmittance of a surface at normal incidence."""
+    return (1 - ((glass.ior - 1) / (glass.ior + 1)) ** 2) * np.array(glass.color)
 
 
 def _factors(view: View, change: Shaped[F32, "pixels 3"]) -> Shaped[F32, "n 3"]:

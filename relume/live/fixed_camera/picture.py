@@ -15,8 +15,8 @@ from relume.brdf.curves import curve_bands, generated_bands
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ParameterError
 from relume.live.fixed_camera.background import Background
-from relume.live.fixed_camera.edited_glass import EditedGlass, TracedView
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
+from relume.live.fixed_camera.edited_glass import EditedGlass, TracedView
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, ProgressCallback

@@ -182,6 +182,7 @@ class OpenBake(Protocol):
         cache: for everything that can be recomputed from the bake.
         key: identifies results of this bake in the cache.
         default_look: the complete look of the scene as it was imported.
+        glass: the glass that its rays have met.
         camera_mode, axes: capabilities of its pictures; callers do not check the method's name.
     """
 
@@ -195,6 +196,8 @@ class OpenBake(Protocol):
     def method(self) -> str: ...
     @property
     def default_look(self) -> dict[str, Any]: ...
+    @property
+    def glass(self) -> GlassOfLook: ...
     @property
     def material_names(self) -> Sequence[str]: ...
     @property
@@ -244,7 +247,6 @@ class FixedViewTransfer(OpenBake, Protocol):
 
     Attributes:
         num_lights: approximate number of triangles of its environment.
-        glass: the glass that rays have met.
         derived, edited: image files of the imported look, and of other looks.
         indirect: indirect illumination; None if it was not baked.
     """
@@ -255,8 +257,6 @@ class FixedViewTransfer(OpenBake, Protocol):
     def views(self) -> Mapping[str, View]: ...
     @property
     def num_lights(self) -> int: ...
-    @property
-    def glass(self) -> GlassOfLook: ...
     @property
     def derived(self) -> ImageFiles: ...
     @property

@@ -2,8 +2,8 @@
 
 Light triangles, patches and their visibility are in the bake already. Only the view-dependent part is traced, by the
 stages of the method `gather`: view samples, their visible lights, their gather hits. A static view is as exact as
-`gather`, and shares all results computed from the bake's light. Glass that a look edits stops other rays, so the rays of
-patches are traced again as well, once for all views (`relume.live.opened.edited_glass`).
+`gather`, and shares all results computed from the bake's light. Glass that a look edits stops other rays, so the rays
+of patches are traced again as well, once for all views (`relume.live.opened.edited_glass`).
 """
 
 from __future__ import annotations
