@@ -162,7 +162,6 @@ def _open(
 
     @cache
     def find_static_views() -> StaticViewBuilder:
-        light_transport = transfer.light_transport if isinstance(transfer, BakedFreeCamera) else transfer
-        return StaticViewBuilder(light_transport, load_registered_scene(service.data_dir, scene.id))
+        return StaticViewBuilder.from_bake(transfer, load_registered_scene(service.data_dir, scene.id))
 
     return RenderSource(scene, bake_status, view_name, transfer, None if is_approximate else find_static_views)

@@ -26,11 +26,11 @@ class GlassPassages(NamedTuple):
     """Glass along the rays through the centers of pixels.
 
     Attributes:
-        count: number of surfaces of glass that each ray passes, by material of the scene.
+        num_surfaces: number of surfaces of glass that each ray passes, by material of the scene.
         length: of each ray inside solids, meters, by material of the scene.
     """
 
-    count: Mapping[int, Shaped[NDArray[np.uint8], " pixels"]]
+    num_surfaces: Mapping[int, Shaped[NDArray[np.uint8], " pixels"]]
     length: Mapping[int, Shaped[F32, " pixels"]]
 
 
@@ -43,10 +43,10 @@ def trace_passages(geometry: SceneBuffers, camera: Camera, size: tuple[int, int]
     alpha_test = geometry.embree.alpha_test
     assert alpha_test is not None  # callers have glass
     masks = alpha_test.alpha_masks
-    glass = np.flatnonzero((masks.material_rule >= 0) & (masks.rules[masks.material_rule, 0] == GLASS_RULE))
+    glass = np.flatnonzero((masks.material_rule >= 0) & (masks.rules[masks.material_rule, 0] == GLASS_RULE)).tolist()
     num = size[0] * size[1]
-    count = {int(index): np.zeros(num, np.uint8) for index in glass}
-    length = {int(index): np.zeros(num, np.float32) for index in glass}
+    num_surfaces = {index: np.zeros(num, np.uint8) for index in glass}
+    length = {index: np.zeros(num, np.float32) for index in glass}
     y, x = np.divmod(np.arange(num), size[0])
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     origins, ray = np.tile(camera.to_world[:3, 3].astype(np.float32), (num, 1)), np.arange(num)
@@ -56,7 +56,7 @@ def trace_passages(geometry: SceneBuffers, camera: Camera, size: tuple[int, int]
         leaves = np.einsum("nc,nc->n", geometry.face_normals[np.maximum(hits.face, 0)], directions[ray]) > 0
         for index in glass:
             is_hit = material == index
-            count[index][ray[is_hit]] += 1
+            num_surfaces[index][ray[is_hit]] += 1
             if masks.rules[masks.material_rule[index], 5] > 1:  # a solid
                 is_inside = is_hit & leaves
                 length[index][ray[is_inside]] += hits.distance[is_inside]
@@ -65,4 +65,4 @@ def trace_passages(geometry: SceneBuffers, camera: Camera, size: tuple[int, int]
             break
         ahead = (hits.distance[passes] + 2 * geometry.epsilon)[:, None]
         origins, ray = origins[passes] + ahead * directions[ray[passes]], ray[passes]
-    return GlassPassages(count, length)
+    return GlassPassages(num_surfaces, length)

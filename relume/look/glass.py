@@ -76,6 +76,7 @@ def glass_digest(glass: GlassOfLook) -> str:
 def _with_glass(material: Material, glass: GlassLook | None) -> Material:
     if glass is None or material.glass is None:
         return material
-    fields = {"tint": glass.color, "absorbed": glass.absorption, "ior": glass.ior, "roughness": glass.roughness}
-    edited = replace(material.glass, **fields)
+    edited = replace(
+        material.glass, tint=glass.color, absorbed=glass.absorption, ior=glass.ior, roughness=glass.roughness
+    )
     return material if edited == material.glass else replace(material, glass=edited)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class RenderSource(NamedTuple):
-    """A bake of a scene, opened, one of its views, and what makes the builder of static views; None if none is exact."""
+    """A bake of a scene, opened, one of its views, and what makes the builder of static views; None to have none."""
 
     scene: SceneRecord
     bake: BakeStatus

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 F32 = NDArray[np.float32]
 
 _MIN_TRANSMITTANCE = 1e-3  # darker glass is no measure of the light behind it
-_MAX_RATIO = 100.0
+_MAX_RATIO, _MAX_EXPONENT = 100.0, 20.0
 
 
 class TracedView(NamedTuple):
@@ -159,13 +159,14 @@ def color_change(
         passages: glass in front of each pixel, n and s. before, after: glass of the same materials, with transmittances
             t and t' of a surface at normal incidence and absorption a and a'. names: names of the scene's materials.
     """
-    out, edited = np.ones((len(next(iter(passages.count.values()), ())), 3)), dict(after)
+    out, edited = np.ones((len(next(iter(passages.num_surfaces.values()), ())), 3)), dict(after)
     for name, glass in before:
         index = names.index(name)
-        if index in passages.count and edited[name] != glass:
+        if index in passages.num_surfaces and edited[name] != glass:
             ratio = _transmittance(edited[name]) / np.maximum(_transmittance(glass), _MIN_TRANSMITTANCE)
             more = np.subtract(edited[name].absorption, glass.absorption)
-            out *= ratio ** passages.count[index][:, None] * np.exp(-more * passages.length[index][:, None])
+            optical_depth = more * passages.length[index][:, None]
+            out *= ratio ** passages.num_surfaces[index][:, None] * np.exp(np.minimum(-optical_depth, _MAX_EXPONENT))
     return np.clip(out, 0, _MAX_RATIO).astype(np.float32)
 
 
@@ -175,7 +176,13 @@ def _transmittance(glass: GlassLook) -> Shaped[NDArray[np.float64], " 3"]:
 
 
 def _factors(view: View, change: Shaped[F32, "pixels 3"]) -> Shaped[F32, "n 3"]:
-    """Return the factor of each sample, in the order of the view's pixels. change: of what is behind glass"""
+    """Return the factor of each sample, in the order of the view's pixels.
+
+    Samples are behind glass if that attenuates them: what white glass without refraction shows is not previewed.
+
+    Args:
+        view: the view. change: factor of what is behind glass.
+    """
     transmittance = view.store.read(f"views/{view.index}/transmittance")[view.order]
     is_behind = (transmittance != 1).any(axis=1)
     pixel = np.repeat(np.arange(len(view.first) - 1), np.diff(view.first))

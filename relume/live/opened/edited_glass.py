@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
@@ -48,7 +48,7 @@ def light_through_glass(
         assert masks is not None  # there is glass
         store.arrays["alpha_masks/rules"] = masks.rules
         key = f"{light_transport.key}/glass-{glass_digest(glass)}"
-        fields = {"store": store, "key": key, "views": {}, "glass": glass}
+        fields: dict[str, Any] = {"store": store, "key": key, "views": {}, "glass": glass}
         if isinstance(light_transport, BakedIndirectViews):
             assert isinstance(method, GatherMethod)
             _trace_patches(method, scene, store, progress, is_canceled)

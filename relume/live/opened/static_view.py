@@ -13,6 +13,7 @@ import threading
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
+from typing import Self, cast
 
 import numpy as np
 from jaxtyping import Shaped
@@ -20,10 +21,12 @@ from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.fixed_camera.protocols import OpenBake
 from relume.live.opened.edited_glass import ViewMethod, light_through_glass
 from relume.live.opened.extended_store import ExtendedStore, split_tasks
 from relume.live.opened.fixed_views import BakedFixedViews, SelectedSamples
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import LobeTracer
 from relume.live.opened.local_lights import LocalLights
@@ -170,6 +173,12 @@ class StaticViewBuilder:
             else DirectMethod(smooths_edges=smooths_edges)
             for smooths_edges in (True, False)
         )
+
+    @classmethod
+    def from_bake(cls, bake: OpenBake, scene: Scene) -> Self:
+        """Make the builder of any open bake. scene: that was baked"""
+        fixed = bake.light_transport if isinstance(bake, BakedFreeCamera) else bake
+        return cls(cast("BakedFixedViews", fixed), scene)
 
     def make_static_view(
         self,

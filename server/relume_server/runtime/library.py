@@ -47,10 +47,9 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
 
     def static_view_builder(transfer: Any) -> StaticViewBuilder:
         scene = scene_path_of_bake(Path(transfer.key), transfer.scene_id)
-        light_transport = transfer.light_transport if transfer.camera_mode is CameraMode.FREE else transfer
         return memory.transient.get_value(
             (transfer.key, "scene"),
-            lambda: StaticViewBuilder(light_transport, load_scene(fetch_if_missing(scene))),
+            lambda: StaticViewBuilder.from_bake(transfer, load_scene(fetch_if_missing(scene))),
         )
 
     def make_picture(transfer: Any, view: str) -> Any:
