@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, TypeVar
 
+import numpy as np
+
+from relume.core.digest import digest
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
 from relume.live.opened.extended_store import ExtendedStore, split_tasks
 from relume.live.opened.fixed_views import BakedFixedViews
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.stored_patches import read_patches
-from relume.look.glass import GlassOfLook, glass_digest
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
 from relume.raytrace.alpha_test import collect_alpha_masks
@@ -29,33 +31,35 @@ def light_through_glass(
     light_transport: Transport,
     method: ViewMethod,
     scene: Scene,
-    glass: GlassOfLook,
     progress: ProgressCallback,
     is_canceled: CancelCheck,
 ) -> Transport:
-    """Return the light of a bake as if its scene had other glass, without views.
+    """Return the light of a bake as if its scene had other glass, without views; the same if its shadows are the same.
 
     Args:
-        light_transport: the light of the bake. method: traces its rays. scene: with that glass. glass: the same.
+        light_transport: the light of the bake. method: traces its rays. scene: with that glass.
         progress: called with the completed fraction. is_canceled: polled.
     Raises:
         CancelledError: `is_canceled` returned true.
     """
 
+    masks = collect_alpha_masks(scene.materials)
+    assert masks is not None  # there is glass
+    if np.array_equal(masks.rules, light_transport.store.read("alpha_masks/rules")):  # only camera rays differ
+        return light_transport
+
     def trace() -> Transport:
         store = ExtendedStore(light_transport.store, {"views": []})
-        masks = collect_alpha_masks(scene.materials)
-        assert masks is not None  # there is glass
         store.arrays["alpha_masks/rules"] = masks.rules
-        key = f"{light_transport.key}/glass-{glass_digest(glass)}"
-        fields: dict[str, Any] = {"store": store, "key": key, "views": {}, "glass": glass}
+        key = f"{light_transport.key}/glass-{digest(masks.rules.tobytes())[:16]}"
+        fields: dict[str, Any] = {"store": store, "key": key, "views": {}}
         if isinstance(light_transport, BakedIndirectViews):
             assert isinstance(method, GatherMethod)
             _trace_patches(method, scene, store, progress, is_canceled)
             return replace(light_transport, **fields, patches=read_patches(store))
         return replace(light_transport, **fields)
 
-    cache_key = light_transport.key, "light through edited glass", glass
+    cache_key = light_transport.key, "light through edited glass", masks.rules.tobytes()
     return light_transport.cache.transient.get_value(cache_key, trace)
 
 

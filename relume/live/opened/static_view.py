@@ -59,18 +59,21 @@ class StaticView(BakedIndirectViews):
     reflects: bool
 
     @classmethod
-    def from_bake(cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool) -> StaticView:
+    def from_bake(
+        cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool, glass: GlassOfLook
+    ) -> StaticView:
         """Open the view of an extended store.
 
         Args:
             light_transport: the light of the bake. store: over the bake's. reflects: True if it has gather rays.
+            glass: that its camera rays have met.
         """
         view = open_view(store, 0, light_transport.cache, light_transport.key)
         bake_fields = {
             bake_field.name: getattr(light_transport, bake_field.name) for bake_field in fields(BakedIndirectViews)
         }
         return cls(
-            **{**bake_fields, "store": store, "views": {view.name: view}},
+            **{**bake_fields, "store": store, "views": {view.name: view}, "glass": glass},
             light_transport=light_transport,
             reflects=reflects,
         )
@@ -204,13 +207,14 @@ class StaticViewBuilder:
         """
         light_transport, scene = self._light_transport, self._scene
         method = self._smooth if smooths_edges else self._sparse
-        if glass is not None and glass != light_transport.glass:
+        glass = light_transport.glass if glass is None else glass
+        if glass != light_transport.glass:
             scene = with_glass(scene, glass)
             light_transport = light_through_glass(
-                light_transport, method, scene, glass, lambda share: progress(_LIGHT_FRACTION * share), is_canceled
+                light_transport, method, scene, _part(progress, 0, _LIGHT_FRACTION), is_canceled
             )
-            progress = _later(progress)
-        name = _view_name(camera, size, smooths_edges)
+            progress = _part(progress, _LIGHT_FRACTION, 1)
+        name = _view_name(camera, size, smooths_edges, scene)
         key = light_transport.key, "static view", name
         cache = light_transport.cache.transient
         tracing = cache.get_cached(key, StaticTracing)
@@ -219,9 +223,9 @@ class StaticViewBuilder:
             tracing = cache.get(key, StaticTracing, new_tracing.num_bytes, lambda: new_tracing)
         tracing.complete_tracing(reflects, progress, is_canceled)
         if isinstance(light_transport, BakedIndirectViews):
-            return StaticView.from_bake(light_transport, tracing.store, reflects)
+            return StaticView.from_bake(light_transport, tracing.store, reflects, glass)
         view = open_view(tracing.store, 0, light_transport.cache, light_transport.key)
-        return replace(light_transport, store=tracing.store, views={view.name: view})
+        return replace(light_transport, store=tracing.store, views={view.name: view}, glass=glass)
 
 
 def _start_tracing(
@@ -232,12 +236,12 @@ def _start_tracing(
     return StaticTracing(method, scene, recipe, ExtendedStore(light_transport.store, method.attributes(scene, recipe)))
 
 
-def _later(progress: ProgressCallback) -> ProgressCallback:
-    """Report the rest of the progress after the light of patches."""
-    return lambda share: progress(_LIGHT_FRACTION + (1 - _LIGHT_FRACTION) * share)
+def _part(progress: ProgressCallback, start: float, stop: float) -> ProgressCallback:
+    """Report the progress of a part of the work, from one fraction of all to another."""
+    return lambda share: progress(start + (stop - start) * share)
 
 
-def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool) -> str:
+def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool, scene: Scene) -> str:
     """Return a unique name of a camera's static view, which identifies its images in the cache."""
-    identity = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges)).encode()
+    identity = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges, scene.id)).encode()
     return f"{camera.name} {hashlib.sha256(identity).hexdigest()[:16]}"
