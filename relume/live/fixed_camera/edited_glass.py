@@ -8,7 +8,7 @@ when the view has been traced with the edited glass (docs/direct-light.md#glass-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Shaped
@@ -22,10 +22,8 @@ from relume.look.glass import GlassOfLook
 from relume.look.model import GlassLook
 from relume.views.view import View
 
-if TYPE_CHECKING:
-    from relume.live.fixed_camera.picture import Picture
-
 F32 = NDArray[np.float32]
+Painted = TypeVar("Painted")
 
 _MIN_TRANSMITTANCE = 1e-3  # darker glass is no measure of the light behind it
 _MAX_RATIO, _MAX_EXPONENT = 100.0, 20.0
@@ -50,20 +48,30 @@ class EditedGlass:
         traced: the view of the bake. make_static_view: traces the view with edited glass; None: it cannot be edited.
 
     Attributes:
-        traced: the view that the picture shows. target: glass of the look.
+        traced: the view that the picture shows.
     """
 
     def __init__(self, traced: TracedView, make_static_view: StaticViewFactory | None) -> None:
         self._baked, self._make_static_view = traced, make_static_view
-        self.traced, self.target = traced, traced.transfer.glass
+        self.traced, self._target = traced, traced.transfer.glass
         self._passages: GlassPassages | None = None
-        self._untraceable: GlassOfLook | None = None
+        self._has_failed = False  # to trace the target
         self._preview: tuple[GlassOfLook, View, F32] | None = None
 
     def check(self, glass: GlassOfLook) -> None:
         """Raise ResultUnavailableError if this picture cannot show a look's glass."""
         if self._make_static_view is None and glass != self.traced.transfer.glass:
             raise ResultUnavailableError("edited glass is traced in the scene, which is not available to this image")
+
+    @property
+    def target(self) -> GlassOfLook:
+        """Glass of the look."""
+        return self._target
+
+    @target.setter
+    def target(self, glass: GlassOfLook) -> None:
+        self._has_failed &= glass == self._target
+        self._target = glass
 
     @property
     def is_exact(self) -> bool:
@@ -108,8 +116,8 @@ class EditedGlass:
 
     def trace_job(
         self,
-        paint: Callable[[TracedView, ProgressCallback, CancelCheck], Picture],
-        apply: Callable[[TracedView, Picture], None],
+        paint: Callable[[TracedView, ProgressCallback, CancelCheck], Painted],
+        apply: Callable[[TracedView, Painted], None],
     ) -> Job | None:
         """Return the job that traces the view with the target's glass; None if it shows that, or it is impossible.
 
@@ -118,10 +126,10 @@ class EditedGlass:
             apply: receives the view and that picture.
         """
         target = self.target
-        if self.is_exact or target == self._untraceable:
+        if self.is_exact or self._has_failed:
             return None
 
-        def run(progress: ProgressCallback, is_canceled: CancelCheck) -> tuple[TracedView, Picture] | RelumeError:
+        def run(progress: ProgressCallback, is_canceled: CancelCheck) -> tuple[TracedView, Painted] | RelumeError:
             try:
                 traced = self._trace(target, lambda share: progress(0.5 * share), is_canceled)
                 return traced, paint(traced, lambda share: progress(0.5 + 0.5 * share), is_canceled)
@@ -130,10 +138,12 @@ class EditedGlass:
             except RelumeError as error:  # the scene is gone, or it needs more memory than there is
                 return ResultUnavailableError(f"this glass is not available: {error}")
 
-        def apply_result(result: tuple[TracedView, Picture] | RelumeError) -> None:
+        def apply_result(result: tuple[TracedView, Painted] | RelumeError) -> None:
+            if target != self.target:
+                return
             if isinstance(result, RelumeError):
-                self._untraceable = target
-            elif target == self.target:
+                self._has_failed = True
+            else:
                 apply(*result)
 
         label = "light through the edited glass"

@@ -1,4 +1,4 @@
-"""Edited glass and a free camera: static views are traced with it, and the moving image follows its color."""
+"""Edited glass and a free camera: static views are traced with it, and the free-camera image follows its color."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ def finished(picture):
     return picture
 
 
-def moving_image(picture, look):
+def free_camera_image(picture, look):
     picture.set_look(look)
     picture.advance(None)
     return picture.image()
 
 
-def test_the_moving_image_follows_the_color_of_glass(bake):
+def test_the_free_camera_image_follows_the_color_of_glass(bake):
     picture = FreeCameraPicture(bake, "front")
-    before, after = (moving_image(picture, look) for look in (look_with(bake), look_with(bake, color=list(AFTER))))
+    before, after = (free_camera_image(picture, look) for look in (look_with(bake), look_with(bake, color=list(AFTER))))
     center = SIZE[1] // 2, SIZE[0] // 2
     np.testing.assert_allclose(after[center] / before[center], np.divide(AFTER, BEFORE), rtol=1e-3)
     np.testing.assert_array_equal(after[0], before[0])  # past the pane
-    np.testing.assert_array_equal(moving_image(picture, look_with(bake)), before)
+    np.testing.assert_array_equal(free_camera_image(picture, look_with(bake)), before)
 
 
 def test_a_static_view_previews_a_color_and_is_traced_with_it(bake, scene):
