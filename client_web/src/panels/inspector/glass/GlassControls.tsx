@@ -2,6 +2,7 @@
 import { editValue } from "../../../edit/edit";
 import { RANGES, type GlassLook } from "../../../look.gen";
 import type { MaterialLook } from "../../../protocol";
+import { materialOf } from "../../../state/scene";
 import { jsonPointer } from "../../../state/document/pointer";
 import { LabeledColor } from "../../../ui/LabeledColor";
 import { LabeledSlider } from "../../../ui/LabeledSlider";
@@ -17,7 +18,10 @@ interface Props {
 export function GlassControls({ material, materialLook, original }: Props) {
   const glass = materialLook.glass ?? null;
   const initial = original?.glass ?? glass;
-  if (glass === null || initial === null) return null;
+  if (glass === null || initial === null)
+    return materialOf(material)?.is_glass === true ? (
+      <p class="aside">An earlier version made this bake. Bake the scene again to edit what its glass transmits.</p>
+    ) : null;
   const edit = (label: string, change: Partial<GlassLook>) =>
     editValue(label, jsonPointer("materials", material), withGlass(materialLook, change));
   return (
