@@ -88,7 +88,6 @@ class Picture:
         self._scheduler = StrategyScheduler(self._images, is_watched=is_watched)
         self._solo: Solo = None
         self._glass = EditedGlass(TracedView(transfer, view_name), make_static_view)
-        self._glass_factors: F32 | None = None
 
     def check(self, look: Look) -> None:
         """Check that a look can be shown, without changing the picture.
@@ -216,7 +215,7 @@ class Picture:
         for index in images.update_mirrors(self._look):
             tiles.update(self._view.material_tiles[index])
         glass_factors = self._glass.preview(self._view)
-        is_glass_new, self._glass_factors = glass_factors is not self._glass_factors, glass_factors
+        is_glass_new, images.glass_factors = glass_factors is not images.glass_factors, glass_factors
         if is_background_new or is_glass_new or not np.array_equal(self._gain, gain):
             self._gain = gain
             tiles.update(self._view.all_tiles)
@@ -235,13 +234,7 @@ class Picture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Return the payload of a frame, "rgb9e5" or "f32": the tiles in order, row-major."""
-        return encode(self._view, self._radiance, tiles, form, self._gain, self._factors)
-
-    @property
-    def _factors(self) -> Shaped[F32, "n channels"]:
-        """Factor of each sample in its pixel, with the preview of edited glass."""
-        gains = self._images.mirrors.gains
-        return gains if self._glass_factors is None else gains * self._glass_factors
+        return encode(self._view, self._radiance, tiles, form, self._gain, self._images.throughput)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
         """Return the alpha of each pixel in tiles over display values, one byte each; None if the image is opaque."""
@@ -257,7 +250,7 @@ class Picture:
     def image(self) -> Shaped[F32, "height width 3"]:
         """Return linear radiance, zero where the image is transparent."""
         whole = [(0, 0, self._view.width, self._view.height)]
-        pixels = resolve(self._view, self._radiance, whole, self._gain, self._factors)
+        pixels = resolve(self._view, self._radiance, whole, self._gain, self._images.throughput)
         return pixels.reshape(self._view.height, self._view.width, 3)
 
     def curve(self, pointer: str) -> tuple[Shaped[NDArray[np.float64], "3 J"], Shaped[NDArray[np.float64], "3 J"]]:
