@@ -65,12 +65,8 @@ def with_glass(scene: Scene, glass: GlassOfLook) -> Scene:
     materials = tuple(_with_glass(material, by_name.get(material.name)) for material in scene.materials)
     if all(material is own for material, own in zip(materials, scene.materials, strict=True)):
         return scene
-    return replace(scene, id=f"{scene.id}-{glass_digest(glass)}", materials=materials)
-
-
-def glass_digest(glass: GlassOfLook) -> str:
-    """Return a digest of glass. 16 hexadecimal digits"""
-    return digest([(name, each.model_dump()) for name, each in glass])[:16]
+    identity = digest([(name, each.model_dump()) for name, each in glass])[:16]
+    return replace(scene, id=scene.id + identity, materials=materials)
 
 
 def _with_glass(material: Material, glass: GlassLook | None) -> Material:
