@@ -10,16 +10,22 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.core.errors import StoreError
+from relume.core.errors import CancelledError, StoreError
+from relume.live.fixed_camera.jobs import CancelCheck
 from relume.store.bake_protocol import ArraySpec, StoreReader, Task, TaskOutput
 
 
 class ExtendedStore:
-    """A read-only store with further or other arrays in memory; a `TaskStore`. Its views are in memory alone."""
+    """A read-only store with further or other arrays in memory; a `TaskStore`. Its views are in memory alone.
+
+    Attributes:
+        arrays: in memory. is_canceled: polled by long tasks.
+    """
 
     def __init__(self, store: StoreReader, attributes: Mapping[str, Any]) -> None:
         self._store, self._attributes = store, {**store.attributes, **attributes}
         self.arrays: dict[str, NDArray[Any]] = {}
+        self.is_canceled: CancelCheck = lambda: False
 
     @property
     def attributes(self) -> Mapping[str, Any]:
@@ -29,6 +35,11 @@ class ExtendedStore:
     def shape(self, path: str) -> tuple[int, ...]:
         """Shape of an array."""
         return self.arrays[path].shape if path in self.arrays else self._below(path).shape(path)
+
+    def check_canceled(self) -> None:
+        """Raise CancelledError if `is_canceled` returns true."""
+        if self.is_canceled():
+            raise CancelledError("the view was canceled")
 
     def scratch(self) -> IO[bytes]:
         """Return a scratch file in memory, where the whole view is held."""

@@ -219,7 +219,7 @@ class StaticViewBuilder:
         cache = light_transport.cache.transient
         tracing = cache.get_cached(key, StaticTracing)
         if tracing is None:
-            new_tracing = _start_tracing(method, light_transport, scene, replace(camera, name=name), size)
+            new_tracing = _start_tracing(method, light_transport, scene, replace(camera, name=name), size, is_canceled)
             tracing = cache.get(key, StaticTracing, new_tracing.num_bytes, lambda: new_tracing)
         tracing.complete_tracing(reflects, progress, is_canceled)
         if isinstance(light_transport, BakedIndirectViews):
@@ -229,11 +229,21 @@ class StaticViewBuilder:
 
 
 def _start_tracing(
-    method: ViewMethod, light_transport: BakedFixedViews, scene: Scene, camera: Camera, size: tuple[int, int]
+    method: ViewMethod,
+    light_transport: BakedFixedViews,
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    is_canceled: CancelCheck,
 ) -> StaticTracing:
+    """Find the samples of a view. Raises CancelledError if `is_canceled` returned true."""
     recipe = Recipe(method.name, (camera.name,), size, light_transport.num_lights)
     scene = with_cameras(scene, [camera])
-    return StaticTracing(method, scene, recipe, ExtendedStore(light_transport.store, method.attributes(scene, recipe)))
+    store = ExtendedStore(light_transport.store, method.attributes(scene, recipe))
+    store.is_canceled = is_canceled
+    tracing = StaticTracing(method, scene, recipe, store)
+    store.is_canceled = lambda: False  # each task of the rest is short
+    return tracing
 
 
 def _part(progress: ProgressCallback, start: float, stop: float) -> ProgressCallback:

@@ -185,6 +185,16 @@ def test_tracing_is_canceled_and_starts_again(bake, builder):
     run_until_exact(picture)
 
 
+def test_tracing_is_canceled_while_samples_are_found(bake, builder):
+    picture = picture_of(bake, builder.make_static_view)
+    previewed(with_look(bake, picture, {"roughness": 0.27}))  # the light of patches stays the same
+    reported = []
+    with pytest.raises(CancelledError):
+        picture.next_job().run(reported.append, lambda: True)
+    assert reported == []
+    run_until_exact(picture)
+
+
 def test_without_its_scene_glass_is_reported_once(bake):
     def fail(*args, **options):
         raise SceneError("the scene was deleted")
