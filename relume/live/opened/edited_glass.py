@@ -42,7 +42,6 @@ def light_through_glass(
     Raises:
         CancelledError: `is_canceled` returned true.
     """
-
     masks = collect_alpha_masks(scene.materials)
     assert masks is not None  # there is glass
     if np.array_equal(masks.rules, light_transport.store.read("alpha_masks/rules")):  # only camera rays differ
