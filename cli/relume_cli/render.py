@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -155,9 +156,12 @@ def _open(
     transfer = open_cached(service.store_path(bake_status.id), lambda store: open_bake(store, Cache(4 << 30)))
     if not bake_status.is_current:
         note(f"note: another version of relume made this bake; update it: relume bake {scene.id}")
-    static_views = None
-    if isinstance(transfer, BakedFreeCamera) and approximate:
+    is_approximate = isinstance(transfer, BakedFreeCamera) and approximate
+    if is_approximate:
         note("note: --approximate renders the image shown while the camera moves; leave it out for the exact one")
-    elif isinstance(transfer, BakedFreeCamera):
-        static_views = StaticViewBuilder(transfer.light_transport, load_registered_scene(service.data_dir, scene.id))
-    return RenderSource(scene, bake_status, view_name, transfer, static_views)
+
+    @cache
+    def find_static_views() -> StaticViewBuilder:
+        return StaticViewBuilder.from_bake(transfer, load_registered_scene(service.data_dir, scene.id))
+
+    return RenderSource(scene, bake_status, view_name, transfer, None if is_approximate else find_static_views)

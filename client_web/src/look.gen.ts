@@ -42,6 +42,14 @@ export interface EnvironmentLook {
   rotation: number;
 }
 
+/** Light through a surface of glass; its material's terms are what it reflects. `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; not of thin glass. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`: index of refraction. */
+export interface GlassLook {
+  color: [number, number, number];
+  absorption?: [number, number, number];
+  roughness: number;
+  ior: number;
+}
+
 /** A complete, valid look, made by `relume.look.validate`. */
 export interface Look {
   materials: Record<string, MaterialLook>;
@@ -52,11 +60,12 @@ export interface Look {
   display: DisplayLook;
 }
 
-/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. */
+/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it. */
 export interface MaterialLook {
   terms: TermLook[];
   shadow_catcher?: boolean;
   normal_map?: NormalMapLook | null;
+  glass?: GlassLook | null;
 }
 
 /** All surfaces of a material emit and are visible; emission is radiance. `image`: an uploaded image, "image:<id>", by which they emit: radiance is emission times its linear RGB. None: they emit as in the scene. */
@@ -166,6 +175,7 @@ export const RANGES = {
   transport: { bounces: { minimum: 0, maximum: 24 } },
   display: { exposure: { minimum: -20, maximum: 20 } },
   light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000 }, position: { minimum: -1000000, maximum: 1000000 }, direction: { minimum: -1000000, maximum: 1000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 0.0001, maximum: 10000 }, cone: { minimum: 0, maximum: 90 } },
+  glass: { color: { minimum: 0, maximum: 1 }, absorption: { minimum: 0, maximum: 1000000 }, roughness: { minimum: 0, maximum: 1 }, ior: { minimum: 1, maximum: 4 } },
   term: { color: { minimum: 0, maximum: 10000 } },
 } as const;
 

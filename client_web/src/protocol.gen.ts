@@ -846,7 +846,7 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks cannot change it. */
+/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -60,6 +61,7 @@ class CameraSetup:
     Attributes:
         scene: the scene. geometry: its triangles. camera: the camera. size: image width and height in pixels.
         traces_mirrors: trace rays that mirrors reflect.
+        check_canceled: called for each tile; raises CancelledError if the samples are no longer needed.
     """
 
     scene: Scene
@@ -67,6 +69,7 @@ class CameraSetup:
     camera: Camera
     size: tuple[int, int]
     traces_mirrors: bool = True
+    check_canceled: Callable[[], None] = lambda: None
 
     @property
     def pixel_angle(self) -> float:
@@ -90,6 +93,7 @@ class CameraSetup:
     def _trace_layers(
         self, directions: F32, alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE, facets: F64 | None = None
     ) -> list[TransparencyLayer]:
+        self.check_canceled()
         return trace_layers(
             self.geometry, self.scene.materials, self._origin, directions, alpha_sample, self.pixel_angle,
             traces_mirrors=self.traces_mirrors, facets=facets,

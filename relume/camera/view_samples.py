@@ -303,6 +303,7 @@ def _split_tinted(
     light = TintedLight(camera_setup.geometry, camera_setup.scene.environment.radiance)
     tints, num_rays = np.full((num, light.num_groups, 3), np.nan, np.float32), 0
     for start in range(0, num_surface, POINTS_PER_BLOCK):
+        camera_setup.check_canceled()
         block = slice(start, min(start + POINTS_PER_BLOCK, num_surface))
         tints[block], num_traced = light.tints(columns["position"][block], columns["normal"][block])
         num_rays += num_traced

@@ -268,7 +268,7 @@ class Cache:
         state, used = self._state, {*bakes, ASSETS} if bakes else set()
         with state.lock:
             pools = state.transient, state.persistent
-            unused = [(pool, key) for pool in pools for key in pool if _key_owner(key) not in used]
+            unused = [(pool, key) for pool in pools for key in pool if not _belongs_to(_key_owner(key), used)]
             for pool, key in unused:
                 if isinstance(pool[key], _CachedValue) and _key_owner(key) != ASSETS:
                     pool.drop(key)
@@ -282,6 +282,11 @@ class Cache:
 
 def _key_owner(key: Hashable) -> Hashable:
     return key[0] if isinstance(key, tuple) and key else None
+
+
+def _belongs_to(owner: Hashable, owners: Collection[str]) -> bool:
+    """True for one of some owners, and for what is derived of a store: a path below the store's."""
+    return owner in owners or (isinstance(owner, str) and any(owner.startswith(f"{store}/") for store in owners))
 
 
 def _cache_owner(key: Hashable, entry: Sized) -> CacheOwner:

@@ -19,6 +19,7 @@ from relume.core.validation import (
     names_text,
 )
 from relume.image_io.ocio.view import MAX_NAME
+from relume.look.glass import complete_glass, default_glass
 from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
 from relume.look.model import BackgroundKind, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
@@ -38,6 +39,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "transport": {"show": "all", "bounces": MAX_BOUNCES},
     "display": {"exposure": 0.0, "tone_map": "agx"},
 }
+_OPTIONAL = {"normal_map": None, "glass": None}  # of materials
 _SECTIONS = tuple(Look.model_fields)
 
 
@@ -52,6 +54,7 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
             material.name: {
                 "terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ()),
                 **({"shadow_catcher": True} if material.shadow_catcher else {}),
+                **({} if material.glass is None else {"glass": default_glass(material.glass)}),
             }
             for material in scene_materials
         },
@@ -115,15 +118,25 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
     if partial is previous[name] or partial is default[name]:
         return partial
     pointer: Pointer = ("materials", name)
-    fields = _merge(pointer, partial, {**default[name], "normal_map": None})  # only a ground has `shadow_catcher`
+    # only a ground has `shadow_catcher`, and only glass has `glass`
+    fields = _merge(pointer, partial, {**_OPTIONAL, **default[name]})
     if not isinstance(fields.get("shadow_catcher", True), bool):
         raise invalid_value((*pointer, "shadow_catcher"), fields["shadow_catcher"], "true or false")
-    normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map", None))
+    normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map"))
+    glass = _complete_glass((*pointer, "glass"), fields.pop("glass"), default[name].get("glass"))
     return {
         **fields,
         "terms": _complete_terms((*pointer, "terms"), fields["terms"], previous[name]["terms"]),
         **normals,
+        **glass,
     }
+
+
+def _complete_glass(pointer: Pointer, partial: Any, default: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Complete the glass of a material: null is the scene's own; empty if it is opaque."""
+    if partial is not None:
+        return {"glass": complete_glass(pointer, partial, default)}
+    return {} if default is None else {"glass": default}
 
 
 def _complete_normals(pointer: Pointer, partial: Any) -> dict[str, Any]:

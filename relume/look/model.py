@@ -61,16 +61,31 @@ class NormalMapLook(_FrozenModel):
     scale: float = 1.0
 
 
+class GlassLook(_FrozenModel):
+    """Light through a surface of glass; its material's terms are what it reflects.
+
+    `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; not
+    of thin glass. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`:
+    index of refraction.
+    """
+
+    color: Rgb
+    absorption: Rgb = (0.0, 0.0, 0.0)
+    roughness: float
+    ior: float
+
+
 class MaterialLook(_FrozenModel):
     """A material: the sum of its terms.
 
     A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects.
-    `normal_map` replaces the scene's own.
+    `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it.
     """
 
     terms: tuple[TermLook, ...]
     shadow_catcher: bool = False
     normal_map: NormalMapLook | None = None
+    glass: GlassLook | None = None
 
     @property
     def normals(self) -> NormalMap | None:

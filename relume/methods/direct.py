@@ -15,13 +15,17 @@ from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Tas
 
 
 class DirectMethod:
-    """Implements `relume.store.bake_protocol.BakeMethod`."""
+    """Implements `relume.store.bake_protocol.BakeMethod`.
+
+    Args:
+        smooths_edges: whether pixels on edges have several samples.
+    """
 
     name = "direct"
     stages = SampledViews.stages
 
-    def __init__(self) -> None:
-        self._views = SampledViews()
+    def __init__(self, *, smooths_edges: bool = True) -> None:
+        self._views = SampledViews(smooths_edges=smooths_edges)
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Return upper bounds, from the recipe alone."""

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -192,7 +193,9 @@ class SampledViews:
             return TaskOutput(
                 {**light_arrays(scene, recipe), **triangle_arrays(self.geometry_of(scene), scene)}, 0, 0.0
             )
-        camera = camera_setup(scene, self.geometry_of(scene), task.group, recipe.size)
+        camera = replace(
+            camera_setup(scene, self.geometry_of(scene), task.group, recipe.size), check_canceled=store.check_canceled
+        )
         columns, num_rays = sample_pixels(camera, store.scratch, _columns(scene), smooths_edges=self._smooths_edges)
         prefix = f"views/{recipe.views.index(task.group)}"
         return TaskOutput({f"{prefix}/{name}": column for name, column in columns.items()}, num_rays, 0.0)

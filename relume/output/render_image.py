@@ -17,6 +17,7 @@ from relume.live.free_camera.static_view_jobs import StaticViewState
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import Look
+from relume.look.glass import glass_of
 from relume.scene.model import Camera
 
 
@@ -41,28 +42,38 @@ def render_image(
         for_display: coverage is for compositing of display values, as in PNG and WebP.
         camera_and_size: for a bake with a free camera, another camera than the view's, and the size of the image.
         static_views: for such a bake, static views that make the image exact; None: the image is the free-camera image.
+            Looks with edited glass need them with any bake, see `needs_tracing`.
     Returns:
         Linear radiance; for a transparent background, coverage as a fourth channel, with premultiplied color.
     Raises:
         PlanError: the size differs from the baked one.
         CancelledError: `is_canceled` returned true.
+        ResultUnavailableError: the look edits glass, and there are no static views.
     """
     view = transfer.views[view_name]
-    if isinstance(transfer, BakedFreeCamera):
-        camera_and_size = camera_and_size or (view.camera, size or (view.width, view.height))
-        if static_views is None:
-            return _pixels(_render_free_camera(transfer, view_name, look, camera_and_size), for_display)
+    baked_size = view.width, view.height
+    if not isinstance(transfer, BakedFreeCamera):
+        camera_and_size = view.camera, baked_size
+        if size is not None and tuple(size) != baked_size:
+            raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
+    camera_and_size = camera_and_size or (view.camera, size or baked_size)
+    if static_views is not None and needs_tracing(transfer, look):
         cache = transfer.cache.transient
         exact = StaticViewState(static_views.make_static_view, cache, camera_and_size, look, None).static_picture(
             progress, is_canceled
         )
         return _pixels(exact, for_display)
-    if size is not None and tuple(size) != (view.width, view.height):
-        raise PlanError(f"the bake is {view.width}×{view.height}, not {size[0]}×{size[1]}; bake that size")
+    if isinstance(transfer, BakedFreeCamera):
+        return _pixels(_render_free_camera(transfer, view_name, look, camera_and_size), for_display)
     picture = Picture(cast("FixedViewTransfer", transfer), view_name, transfer.cache.transient)
     picture.set_look(look)
     render_exact(picture, look, progress, is_canceled)
     return _pixels(picture, for_display)
+
+
+def needs_tracing(transfer: OpenBake, look: Look) -> bool:
+    """Return whether the exact image of a look needs rays that the bake has not traced."""
+    return isinstance(transfer, BakedFreeCamera) or glass_of(look) != transfer.glass
 
 
 def _pixels(picture: Picture | FreeCameraPicture, for_display: bool) -> NDArray[np.float32]:

@@ -171,6 +171,10 @@ class TaskStore(StoreReader, Protocol):
         """Open a temporary file for writing and reading; it is deleted when it is closed."""
         ...
 
+    def check_canceled(self) -> None:
+        """Raise CancelledError if the result is no longer needed; long tasks call this regularly."""
+        ...
+
 
 class BakeMethod(Protocol):
     """Baking of a light transport method; nothing of pictures."""

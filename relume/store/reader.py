@@ -73,6 +73,9 @@ class Reader:
                 raise StoreDeletedError from error
             raise
 
+    def check_canceled(self) -> None:
+        """Do nothing: tasks of bakes end with their process. See `relume.store.bake_protocol.TaskStore`."""
+
     def scratch(self) -> IO[bytes]:
         """Open a nameless file beside the arrays. See `relume.store.bake_protocol.TaskStore`."""
         return scratch_file(self.path)

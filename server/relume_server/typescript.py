@@ -20,6 +20,7 @@ from relume.image_io.ocio.lut import GAIN, SIZE
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look import LightLook, Look
 from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
+from relume.look.glass import GLASS_RANGES
 from relume.look.light_validation import LIGHT_RANGES, default_light
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.validate import MAX_LIGHT_NAME, MAX_LIGHTS
@@ -167,7 +168,7 @@ def generate_look() -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-_EXTRA_RANGES = {"light": LIGHT_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
+_EXTRA_RANGES = {"light": LIGHT_RANGES, "glass": GLASS_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
 _MAXIMA = {
     "MAX_TERMS": MAX_TERMS,
     "MAX_LIGHTS": MAX_LIGHTS,

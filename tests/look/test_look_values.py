@@ -7,10 +7,13 @@ import copy
 import jsonpatch
 import pytest
 from example_look import CURVES, INF, MATERIALS, NAN, SIGMA, make_flat_curve
+from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.core.errors import ParameterError
 from relume.look import apply_patch, default_look, validate
-from relume.scene.model import Light, Material
+from relume.look.glass import glass_of, with_glass
+from relume.look.model import GlassLook
+from relume.scene.model import Glass, Light, Material
 
 
 @pytest.mark.parametrize(
@@ -180,3 +183,56 @@ def test_a_scene_with_an_invalid_light_is_rejected_with_its_pointer(fields, poin
     with pytest.raises(ParameterError) as raised:
         default_look(MATERIALS, [Light("A", fields)])
     assert raised.value.name == pointer
+
+
+WHITE = Material("White", ({"model": "lambert"},))
+GLASS = Material("Glass", ({"model": "lambert"},), glass=Glass(tint=(0.5, 0.6, 0.7), ior=1.4))
+SOLID = Material("Solid", ({"model": "lambert"},), glass=Glass(thickness=0.1, absorbed=(1.0, 2.0, 3.0)))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "pointer", "allowed"),
+    [
+        *(("/Glass/glass/ior", bad, "/Glass/glass/ior", "[1, 4]") for bad in (0.5, 4.5, NAN, INF, None, "1.5", True)),
+        *(("/Glass/glass/roughness", bad, "/Glass/glass/roughness", "[0, 1]") for bad in (2, -0.1, NAN, [0.1] * 3)),
+        ("/Glass/glass/color", [0.5, -0.1, 0.5], "/Glass/glass/color/1", "[0, 1]"),
+        ("/Glass/glass/color", [0.5, 0.5, NAN], "/Glass/glass/color/2", "[0, 1]"),
+        ("/Glass/glass/color", [1.1, 1, 1], "/Glass/glass/color/0", "[0, 1]"),
+        ("/Glass/glass/color", 0.5, "/Glass/glass/color", "three numbers"),
+        ("/Glass/glass", 3, "/Glass/glass", "an object"),
+        ("/Glass/glass/thickness", 1.0, "/Glass/glass/thickness", "'roughness'"),
+        ("/Glass/glass/absorption", [1, 1, 1], "/Glass/glass/absorption", "'color'"),  # thin glass has none
+        ("/Solid/glass/absorption", [1, 1, -1], "/Solid/glass/absorption/2", "[0, 1e+06]"),
+        ("/White/glass", {"ior": 1.5}, "/White/glass", "transmits no light"),
+    ],
+)
+def test_invalid_glass_is_rejected_with_a_pointer(path, value, pointer, allowed):
+    default = default_look([WHITE, GLASS, SOLID])
+    patch = [{"op": "add", "path": f"/materials{path}", "value": value}]
+    with pytest.raises(ParameterError) as error:
+        apply_patch(default, patch, default)
+    assert f"/materials{pointer}" in str(error.value)
+    assert allowed in str(error.value)
+
+
+def test_glass_of_the_scene_is_the_default_and_is_completed():
+    default = default_look([WHITE, GLASS, SOLID])
+    assert "glass" not in default["materials"]["White"]
+    assert default["materials"]["Glass"]["glass"] == {"color": [0.5, 0.6, 0.7], "roughness": 0.0, "ior": 1.4}
+    edited = validate({"materials": {"Solid": {"glass": {"ior": 2.0}}, "Glass": {"glass": None}}}, default)
+    assert edited.materials["Solid"].glass == GlassLook(color=(1, 1, 1), absorption=(1, 2, 3), roughness=0, ior=2)
+    assert edited.materials["Glass"] == validate({}, default).materials["Glass"]
+
+
+def test_a_scene_with_the_glass_of_a_look_keeps_what_the_look_does_not_edit():
+    scene = make_tiny_scene(
+        quad("pane", [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], 1),
+        camera=make_camera("front", (0, 0, 3), (0, 0, 0), 0.6), environment=studio(), materials=[WHITE, GLASS, SOLID],
+    )  # fmt: skip
+    default = default_look(scene.materials)
+    assert with_glass(scene, glass_of(validate({}, default))) is scene
+    edited = with_glass(scene, glass_of(validate({"materials": {"Solid": {"glass": {"ior": 2.0}}}}, default)))
+    assert edited.materials[:2] == scene.materials[:2]
+    assert edited.materials[2].glass == Glass(ior=2.0, thickness=0.1, absorbed=(1.0, 2.0, 3.0))
+    assert edited.id.startswith(scene.id)
+    assert edited.id != scene.id

@@ -26,13 +26,21 @@ if TYPE_CHECKING:
 
 
 class RenderSource(NamedTuple):
-    """A bake of a scene, opened, one of its views, and for a free camera the builder of exact static views."""
+    """A bake of a scene, opened, one of its views, and what makes the builder of static views; None to have none."""
 
     scene: SceneRecord
     bake: BakeStatus
     view: str
     transfer: OpenBake
-    static_views: StaticViewBuilder | None
+    find_static_views: Callable[[], StaticViewBuilder] | None
+
+    def static_views(self, look: Look) -> StaticViewBuilder | None:
+        """Return the builder of static views if the exact image of a look needs one."""
+        from relume.output.render_image import needs_tracing
+
+        if self.find_static_views is None or not needs_tracing(self.transfer, look):
+            return None
+        return self.find_static_views()
 
 
 def write_picture(
@@ -50,7 +58,7 @@ def write_picture(
         _write_exr(source, look, path, exr, report)
         return
     image = render_image(
-        source.transfer, source.view, look, progress=report, for_display=True, static_views=source.static_views
+        source.transfer, source.view, look, progress=report, for_display=True, static_views=source.static_views(look)
     )
     save(path, image, look)
 
@@ -70,7 +78,11 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
     export_exr(
         path,
         lambda layer_look, layer_progress: render_image(
-            source.transfer, source.view, layer_look, progress=layer_progress, static_views=source.static_views
+            source.transfer,
+            source.view,
+            layer_look,
+            progress=layer_progress,
+            static_views=source.static_views(layer_look),
         ),
         look,
         layers,
@@ -107,7 +119,7 @@ def write_turntable(
             progress=report_frame,
             for_display=True,
             camera_and_size=camera_and_size,
-            static_views=source.static_views,
+            static_views=source.static_views(frame_look),
         )
 
     for index, camera in enumerate(cameras):

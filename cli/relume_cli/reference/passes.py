@@ -87,7 +87,6 @@ def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: 
     """
     from relume.core.cache import Cache
     from relume.live.fixed_camera.protocols import EditAxis
-    from relume.live.opened.free_camera_transfer import BakedFreeCamera
     from relume.live.opened.openers import open_bake
     from relume.live.opened.static_view import StaticViewBuilder
     from relume.output.render_image import render_image
@@ -103,9 +102,7 @@ def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: 
         transfer = open_cached(service.store_path(bake.id), lambda store: open_bake(store, Cache(4 << 30)))
         scene = load_registered_scene(service.data_dir, record.id)
         document = complete_look(partial, transfer.default_look).without_compositing()
-        static_views = (
-            StaticViewBuilder(transfer.light_transport, scene) if isinstance(transfer, BakedFreeCamera) else None
-        )
+        static_views = StaticViewBuilder.from_bake(transfer, scene)
         frame = render_image(transfer, view_name, document, static_views=static_views)
     scene = with_cameras(scene, [transfer.views[view_name].camera])
     size = frame.shape[1], frame.shape[0]

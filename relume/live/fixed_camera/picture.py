@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,15 +16,17 @@ from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ParameterError
 from relume.live.fixed_camera.background import Background
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
+from relume.live.fixed_camera.edited_glass import EditedGlass, TracedView
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, ProgressCallback
 from relume.live.fixed_camera.pixel_probe import highlight_pixels, probe
-from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.fixed_camera.protocols import FixedViewTransfer, StaticViewFactory
 from relume.live.fixed_camera.scheduler import StrategyScheduler
 from relume.live.fixed_camera.strategies.strategy import ActiveControl, HeldControl
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages, material_documents
 from relume.look import Look
+from relume.look.glass import glass_of
 from relume.operators.shade import shaded_bytes
 from relume.views.resolve import encode, encode_coverage, resolve
 from relume.views.view import Tile
@@ -60,9 +63,18 @@ class Picture:
 
     Args:
         is_watched: a user waits for it, so that previews are shown first if better images take long.
+        make_static_view: traces the view with edited glass; None: looks cannot edit glass.
     """
 
-    def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache, *, is_watched: bool = False) -> None:
+    def __init__(
+        self,
+        transfer: FixedViewTransfer,
+        view_name: str,
+        cache: Cache,
+        *,
+        is_watched: bool = False,
+        make_static_view: StaticViewFactory | None = None,
+    ) -> None:
         self._images = ViewImages(transfer, view_name, cache)
         self._view = self._images.view
         self._look = self._images.default
@@ -72,14 +84,19 @@ class Picture:
         self._prepared_pointer: CurvePointer | ParameterPointer | None = None
         self._edited_pointer: CurvePointer | ParameterPointer | None = None
         self._active_pointer: Pointer | None = None
+        self._is_watched = is_watched
         self._scheduler = StrategyScheduler(self._images, is_watched=is_watched)
+        self._solo: Solo = None
+        self._glass = EditedGlass(TracedView(transfer, view_name), make_static_view)
 
     def check(self, look: Look) -> None:
         """Check that a look can be shown, without changing the picture.
 
         Raises:
             MemoryBudgetError: the images of its terms exceed the memory budget.
+            ResultUnavailableError: its glass must be traced, and the scene is not available.
         """
+        self._glass.check(glass_of(look))
         samples = ((m.num_samples, len(material_documents(look, name))) for name, m in self._images.by_name.items())
         self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
 
@@ -92,9 +109,10 @@ class Picture:
             solo: names of the only light sources to show, see `illumination_from_look`; None: all.
         Raises:
             ParameterError: `active_pointer` does not point to an editable control. NotFoundError, SceneError: the
-                environment or an image is not available. StoreError: the bake is too old for images. The picture is
-                unchanged.
+                environment or an image is not available. StoreError: the bake is too old for images.
+                ResultUnavailableError: see `check`. The picture is unchanged.
         """
+        self._glass.check(glass_of(look))
         edited = None if active_pointer is None else parse_pointer(active_pointer)
         before, images = self._images.light, self._images.view_with_overrides(look)
         images.set_look(look, solo)
@@ -104,7 +122,7 @@ class Picture:
         self._active_pointer = edited or self._active_pointer
         if (images.light.environment, images.light.local) != (before.environment, before.local):
             self._prepared_pointer = None  # the user edits a light now
-        self._look = look
+        self._look, self._solo, self._glass.target = look, solo, glass_of(look)
 
     def _switch_images(self, images: ViewImages) -> None:
         """Replace the images with others of the same view."""
@@ -138,8 +156,30 @@ class Picture:
         The picture may advance while the job runs: everything that does not depend on it follows the look. Its result
         is ignored if the look has changed so that it is no longer needed.
         """
+        if (passage_job := self._glass.passage_job()) is not None:
+            return passage_job
         job = self._scheduler.next_job(self._active_control(), self._look)
+        if job is None or job.is_refinement:  # of samples that edited glass replaces
+            job = self._glass.trace_job(partial(self._paint, self._look, self._solo), self._show) or job
         return None if job is None else replace(job, apply=lambda result: self._apply(job, result))
+
+    def _paint(
+        self, look: Look, solo: Solo, traced: TracedView, progress: ProgressCallback, is_canceled: CancelCheck
+    ) -> Picture:
+        """Make the exact picture of a look in a traced view. Raises CancelledError if `is_canceled` returned true."""
+        picture = Picture(*traced, self._images.cache, is_watched=self._is_watched)
+        picture.set_look(look, solo=solo)
+        render_exact(picture, look, progress, is_canceled)
+        return picture
+
+    def _show(self, traced: TracedView, picture: Picture) -> None:
+        """Show another picture of the same look's glass instead, and continue with it."""
+        picture.set_look(self._look, solo=self._solo)
+        picture.look_at(self._images.region)
+        self._glass.show(traced)
+        self._images, self._view, self._radiance = picture._images, picture._view, picture._radiance
+        self._background, self._scheduler = picture._background, picture._scheduler
+        self._gain = np.full(3, -1.0)  # every pixel is new
 
     def _apply(self, job: Job, result: Any) -> None:
         """Apply a result; if it activates the operator of another control, the user edits that one now."""
@@ -174,13 +214,17 @@ class Picture:
                 tiles.update(self._view.material_tiles[index])
         for index in images.update_mirrors(self._look):
             tiles.update(self._view.material_tiles[index])
-        if is_background_new or not np.array_equal(self._gain, gain):
+        glass_factors = self._glass.preview(self._view)
+        is_glass_new, images.glass_factors = glass_factors is not images.glass_factors, glass_factors
+        if is_background_new or is_glass_new or not np.array_equal(self._gain, gain):
             self._gain = gain
             tiles.update(self._view.all_tiles)
         targets = list(images.targets())
         exact = all(target.live.fidelity == Fidelity.EXACT for target in targets)
         fidelity = min((target.fidelity_in(images.region) for target in targets), default=Fidelity.EXACT)
         complete = not any(target.live.latest.is_empty for target in targets)
+        if not self._glass.is_exact:
+            exact, fidelity = False, min(fidelity, Fidelity.APPROXIMATE)
         in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
         return Progress(in_order, exact, fidelity, complete)
 
@@ -190,7 +234,7 @@ class Picture:
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
         """Return the payload of a frame, "rgb9e5" or "f32": the tiles in order, row-major."""
-        return encode(self._view, self._radiance, tiles, form, self._gain, self._images.mirrors.gains)
+        return encode(self._view, self._radiance, tiles, form, self._gain, self._images.throughput)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
         """Return the alpha of each pixel in tiles over display values, one byte each; None if the image is opaque."""
@@ -206,7 +250,7 @@ class Picture:
     def image(self) -> Shaped[F32, "height width 3"]:
         """Return linear radiance, zero where the image is transparent."""
         whole = [(0, 0, self._view.width, self._view.height)]
-        pixels = resolve(self._view, self._radiance, whole, self._gain, self._images.mirrors.gains)
+        pixels = resolve(self._view, self._radiance, whole, self._gain, self._images.throughput)
         return pixels.reshape(self._view.height, self._view.width, 3)
 
     def curve(self, pointer: str) -> tuple[Shaped[NDArray[np.float64], "3 J"], Shaped[NDArray[np.float64], "3 J"]]:

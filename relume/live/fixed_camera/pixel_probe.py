@@ -42,7 +42,7 @@ def probe(
         raise ParameterError("pixel", [x, y], f"x below {view.width} and y below {view.height}")
     pixel = y * view.width + x
     entries = slice(int(view.first[pixel]), int(view.first[pixel + 1]))
-    samples, gains = view.order[entries], images.mirrors.gains[entries]
+    samples, gains = view.order[entries], images.throughput[entries]
     pixel_radiance = gain * (radiance[:, samples] * gains.T).sum(axis=1)
     main_sample = int(samples[np.argmax(view.throughput[entries].max(axis=1))])
     index = int(np.searchsorted(view.bounds, main_sample, side="right")) - 1
@@ -120,7 +120,7 @@ def highlight_pixels(
     material.term_radiance(term, range_image, lit_radiance)
     view = images.view
     whole = [(0, 0, view.width, view.height)]
-    lit = luminance(np.maximum(resolve(view, lit_radiance, whole, 1.0, images.mirrors.gains), 0))
-    total = luminance(resolve(view, radiance, whole, 1.0, images.mirrors.gains))
+    lit = luminance(np.maximum(resolve(view, lit_radiance, whole, 1.0, images.throughput), 0))
+    total = luminance(resolve(view, radiance, whole, 1.0, images.throughput))
     fraction = np.divide(lit, total, out=np.zeros_like(lit), where=total > 1e-9)
     return np.clip(fraction, 0, 1).reshape(view.height, view.width).astype(np.float32)

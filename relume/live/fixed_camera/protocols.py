@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.brdf.lobe_sampling import LobeSampling
     from relume.brdf.texture_slots import EmissionImage
+    from relume.camera.glass_passages import GlassPassages
     from relume.core.cache import Cache
     from relume.lights.spherical_triangles import TriangleLights
     from relume.live.fixed_camera.illumination import Illumination, LightSource
+    from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
     from relume.look import EnvironmentKey, LightGeometry
+    from relume.look.glass import GlassOfLook
     from relume.operators.image_cache import ImageFiles
     from relume.raytrace.moving_light import MovingLight
     from relume.raytrace.surface_points import SurfacePoints
@@ -180,6 +183,7 @@ class OpenBake(Protocol):
         cache: for everything that can be recomputed from the bake.
         key: identifies results of this bake in the cache.
         default_look: the complete look of the scene as it was imported.
+        glass: the glass that its rays have met.
         camera_mode, axes: capabilities of its pictures; callers do not check the method's name.
     """
 
@@ -193,6 +197,8 @@ class OpenBake(Protocol):
     def method(self) -> str: ...
     @property
     def default_look(self) -> dict[str, Any]: ...
+    @property
+    def glass(self) -> GlassOfLook: ...
     @property
     def material_names(self) -> Sequence[str]: ...
     @property
@@ -342,6 +348,10 @@ class FixedViewTransfer(OpenBake, Protocol):
         """Return one view of the bake with 1 / step² of its pixels, for thumbnails."""
         ...
 
+    def glass_passages(self, view: View) -> GlassPassages:
+        """Return the glass in front of each pixel of a view; the bake has glass."""
+        ...
+
     def is_emissive_at(self, view: View, material: int) -> Shaped[NDArray[np.bool_], " n"]:
         """Return whether the camera sees the emitting side of an emissive material, per sample."""
         ...
@@ -354,4 +364,22 @@ class FixedViewTransfer(OpenBake, Protocol):
         self, environment: EnvironmentKey, directions: Shaped[NDArray[np.float64], "n 3"], blur: float = 0
     ) -> Shaped[F32, "n 3"]:
         """Return the radiance of an environment in unit directions, blurred by `blur` degrees."""
+        ...
+
+
+class StaticViewFactory(Protocol):
+    """Traces a fixed view on demand, as an open bake."""
+
+    def __call__(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        reflects: bool,
+        progress: ProgressCallback,
+        is_canceled: CancelCheck,
+        *,
+        smooths_edges: bool = True,
+        glass: GlassOfLook | None = None,
+    ) -> FixedViewTransfer:
+        """Trace the view; see `relume.live.opened.static_view.StaticViewBuilder.make_static_view`."""
         ...

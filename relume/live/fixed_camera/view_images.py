@@ -84,6 +84,7 @@ class ViewImages:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: the illumination. default_light: that of the scene's own look.
         gain: gain of the finished image. mirrors: the mirrors of the image.
+        glass_factors: factors of the samples that preview edited glass, in the view's order; None for 1.
         region: visible pixels of the image: x, y, width, height; None: all.
         outgoing_change: of the last incremental update, for the next term.
     """
@@ -99,6 +100,7 @@ class ViewImages:
         }
         self.gain = picture_gain(self.default)
         self.mirrors = MirrorFactors(self.view)
+        self.glass_factors: F32 | None = None
         self.region: Tile | None = None
         self.outgoing_change: OutgoingChange | None = None
 
@@ -115,6 +117,7 @@ class ViewImages:
             return self
         changed, view = copy(self), with_overrides(self.transfer.views[self.view.name], maps, self.transfer.tracer)
         changed.view, changed.mirrors, changed.by_name = view, MirrorFactors(view), {}
+        changed.glass_factors = None
         baked_to_view = np.empty(view.num_surface_samples, np.int64)
         # sample index in this view, per baked sample
         baked_to_view[self.view.unmodified()] = np.arange(len(baked_to_view))
@@ -126,6 +129,12 @@ class ViewImages:
                 image.keep_displayed(before, baked_to_view[view.unmodified()[rows]] - rows.start)
             changed.by_name[name] = image
         return changed
+
+    @property
+    def throughput(self) -> Shaped[F32, "n channels"]:
+        """Factor of each sample's radiance in its pixel, in the view's order: with mirrors and previewed glass."""
+        gains = self.mirrors.gains
+        return gains if self.glass_factors is None else gains * self.glass_factors
 
     def _map_overrides(self, look: Look, material: str) -> MapOverrides | None:
         """Return the map overrides of a material in a look; None for none."""

@@ -36,6 +36,7 @@ from relume.live.free_camera.frame import (
     shows_btf,
     update_for_materials,
 )
+from relume.live.free_camera.glass import edited_rules
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlight_edges import render_fine_frame
 from relume.live.free_camera.incident_light import IncidentCoefficients
@@ -49,6 +50,7 @@ from relume.live.free_camera.residual_correction import apply_residual
 from relume.live.free_camera.texel_brdf.texel_tables import get_texel_tables
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
+from relume.look.glass import GlassOfLook, glass_of
 from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
@@ -83,6 +85,7 @@ class FreeCameraPicture:
         self._previous: PreviousImage | None = None
         self._dirty_cache: tuple[GBuffer, bytes, DirtyPixels] | None = None
         self._gbuffer: tuple[int, GBuffer] | None = None
+        self._glass: tuple[GlassOfLook, F32 | None] = (), None  # of the look, and its rules
         self._materials: tuple[tuple[Look, bool] | None, MaterialState | None] = None, None
         self._probe_light, self._all_probes = ProbeLightState(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
         self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of hard-shadow lights, for a camera
@@ -116,6 +119,8 @@ class FreeCameraPicture:
         light = illumination_from_look(look, names, has_bounces=True, solo=solo, images=images)
         self._transfer.environment_map(light.environment.map)  # raises now if it is not available
         self._look, self._light, self._solo = look, light, solo
+        if (glass := glass_of(look)) != self._glass[0]:
+            self._glass = glass, edited_rules(self._transfer.embree, names, self._transfer.glass, glass)
         self.correct(None)
 
     def set_camera(self, camera: Camera, size: tuple[int, int]) -> None:
@@ -394,10 +399,15 @@ class FreeCameraPicture:
     def _current_gbuffer(self) -> GBuffer:
         if self._gbuffer is None or self._gbuffer[0] != self._camera_seq:
             self._gbuffer = self._camera_seq, self._trace_gbuffer(self._size)
-        return self._gbuffer[1]
+        (_, gbuffer), rules = self._gbuffer, self._glass[1]
+        if len(gbuffer.glass.ray) and rules is not None and gbuffer.glass.rules is not rules:
+            gbuffer = gbuffer.with_glass_rules(self._transfer.stored_scene, self._transfer.embree, rules)
+            self._gbuffer = self._camera_seq, gbuffer
+        return gbuffer
 
     def _trace_gbuffer(self, size: tuple[int, int]) -> GBuffer:
-        gbuffer = trace_primary(self._transfer.stored_scene, self._transfer.embree, self._camera, size)
+        scene_args = self._transfer.stored_scene, self._transfer.embree
+        gbuffer = trace_primary(*scene_args, self._camera, size, self._glass[1])
         reweight(gbuffer, self._transfer.has_occluded_neighbor, self._transfer.occlusion_mesh)
         return gbuffer
 

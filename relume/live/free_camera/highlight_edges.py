@@ -83,7 +83,7 @@ def add_samples(
     if not len(pixels):
         return frame
     extra_gbuffer = trace_through_glass(
-        transfer.stored_scene, transfer.embree, camera, (width, height), pixels, RAY_POSITIONS
+        transfer.stored_scene, transfer.embree, camera, (width, height), pixels, RAY_POSITIONS, gbuffer.glass.rules
     )
     reweight(extra_gbuffer, transfer.has_occluded_neighbor, transfer.occlusion_mesh)
     owner = np.repeat(pixels, _RAYS_PER_PIXEL)

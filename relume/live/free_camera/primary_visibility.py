@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, find_edges, samples_per_edge
-from relume.live.free_camera.glass import GlassLayers, find_glass_layers, trace_glass
+from relume.live.free_camera.glass import NO_GLASS, GlassLayers, find_glass_layers, trace_glass
 from relume.probes.stored_scene import StoredScene
 from relume.probes.triangle_grids import surrounding_nodes
 from relume.raytrace.alpha_filter import IGNORE_GLASS, STOP_AT_OPAQUE
@@ -23,7 +23,6 @@ from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 
-_NO_VECTORS = np.empty((0, 3), np.float32)
 _PIXEL_CENTER = np.array([[0.5, 0.5]], np.float32)
 
 
@@ -53,14 +52,23 @@ class GBuffer(NamedTuple):
         rows = slice(0, num_pixels)
         return self._replace(
             hits=self.hits.rows(rows), directions=self.directions[rows], owner=self.owner[:0],
-            lattice_node=self.lattice_node[rows], weight=self.weight[rows], glass=GlassLayers(np.empty(0, np.int64),
-            _NO_VECTORS),
+            lattice_node=self.lattice_node[rows], weight=self.weight[rows], glass=NO_GLASS,
         )  # fmt: skip
 
     def pixel_of_ray(self, num_pixels: int) -> Shaped[NDArray[np.intp], " n"]:
         """Return the pixel of each ray. num_pixels: number of pixels of the image"""
         pixel = np.concatenate([np.arange(num_pixels), self.owner])
         return np.concatenate([pixel, pixel[self.glass.ray]])
+
+    def with_glass_rules(
+        self, stored_scene: StoredScene, embree: EmbreeScene, rules: Shaped[F32, "images 6"]
+    ) -> GBuffer:
+        """Return the same rays with other rules of glass. stored_scene, embree: the scene"""
+        first = len(self.directions) - len(self.glass.ray)
+        layers = find_glass_layers(
+            embree, stored_scene, self.hits.rows(slice(first, None)), self.directions[first:], rules
+        )
+        return self._replace(glass=layers._replace(ray=self.glass.ray))
 
     def first_hit_row(self, pixel: int) -> int:
         """Return the row of the first hit at a pixel center, glass included."""
@@ -115,11 +123,18 @@ def _find_nodes(probe_grid, face_normal, hits, directions, start, stop, lattice_
             is_visible[lattice_node[p, k]] = 1
 
 
-def trace_primary(stored_scene: StoredScene, embree: EmbreeScene, camera: Camera, size: tuple[int, int]) -> GBuffer:
+def trace_primary(
+    stored_scene: StoredScene,
+    embree: EmbreeScene,
+    camera: Camera,
+    size: tuple[int, int],
+    glass_rules: Shaped[F32, "images 6"] | None = None,
+) -> GBuffer:
     """Trace the camera rays of an image.
 
     Args:
         stored_scene: the scene. embree: its triangles. camera: camera of the image. size: width and height in pixels.
+        glass_rules: see `GlassLayers`; None: as in the scene.
     """
     num_pixels, camera_position = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
     directions = _directions(camera, size, np.arange(num_pixels, dtype=np.int32), _PIXEL_CENTER)
@@ -140,7 +155,7 @@ def trace_primary(stored_scene: StoredScene, embree: EmbreeScene, camera: Camera
         glass_hits = Hits.concatenate(
             [glass_hits, trace_rays(embree, camera_position, directions[num_pixels:], STOP_AT_OPAQUE)]
         )
-    return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, owner)
+    return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, owner, glass_rules)
 
 
 def trace_through_glass(
@@ -150,11 +165,12 @@ def trace_through_glass(
     size: tuple[int, int],
     pixels: Shaped[NDArray[np.int32], " n"],
     offsets: Shaped[F32, "k 2"],
+    glass_rules: Shaped[F32, "images 6"] | None,
 ) -> GBuffer:
     """Trace more rays through some pixels only.
 
     Args:
-        stored_scene, embree, camera, size: as in `trace_primary`.
+        stored_scene, embree, camera, size, glass_rules: as in `trace_primary`.
         pixels: the pixels. offsets: offsets of rays in each pixel, pixel units.
     Returns:
         k rays for each pixel in succession, as if each ray were a pixel.
@@ -164,7 +180,7 @@ def trace_through_glass(
         trace_rays(embree, camera_position, directions, IGNORE_GLASS),
         trace_glass(embree, camera_position, directions),
     )
-    return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, np.empty(0, np.int32))
+    return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, np.empty(0, np.int32), glass_rules)
 
 
 def _make_gbuffer(
@@ -174,11 +190,12 @@ def _make_gbuffer(
     hits: Hits,
     glass_hits: Hits | None,
     owner: NDArray[np.int32],
+    glass_rules: F32 | None,
 ) -> GBuffer:
     """Make the G-buffer of rays and glass. glass_hits: first hits including glass, None without glass."""
-    glass = GlassLayers(np.empty(0, np.int64), _NO_VECTORS)
+    glass = NO_GLASS
     if glass_hits is not None:
-        glass = find_glass_layers(embree, stored_scene, glass_hits, directions)
+        glass = find_glass_layers(embree, stored_scene, glass_hits, directions, glass_rules)
         hits = Hits.concatenate([hits, glass_hits.rows(glass.ray)])
         directions = np.concatenate([directions, directions[glass.ray]])
     num_rays = len(directions)

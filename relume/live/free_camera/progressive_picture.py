@@ -22,11 +22,11 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import Job
 from relume.live.fixed_camera.picture import Picture, Progress
+from relume.live.fixed_camera.protocols import StaticViewFactory
 from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.static_view_jobs import (
     SizedCamera,
-    StaticViewFactory,
     StaticViewState,
     residual_job,
     should_correct,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Shaped
@@ -15,10 +14,11 @@ from relume.core.errors import CancelledError, RelumeError, ResultUnavailableErr
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.picture import Picture, render_exact
-from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.fixed_camera.protocols import StaticViewFactory
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.residual_correction import CorrectionSamples, residual
 from relume.look import Look
+from relume.look.glass import glass_of
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
@@ -27,23 +27,6 @@ SizedCamera = tuple[Camera, tuple[int, int]]
 TRACING_FRACTION = 0.5  # of the progress of a static view; the rest is shading
 SAMPLE_SPACING = 8  # pixels from one sparse sample to the next
 _MIN_SPARSE_SAMPLES = 1000  # with fewer samples, the exact image takes no longer
-
-
-class StaticViewFactory(Protocol):
-    """Traces a fixed view on demand, as an open bake."""
-
-    def __call__(
-        self,
-        camera: Camera,
-        size: tuple[int, int],
-        reflects: bool,
-        progress: ProgressCallback,
-        is_canceled: CancelCheck,
-        *,
-        smooths_edges: bool = True,
-    ) -> FixedViewTransfer:
-        """Trace the view; see `relume.methods.static_views.StaticViewBuilder.make_static_view`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -85,8 +68,9 @@ class StaticViewState:
             lambda share: progress(TRACING_FRACTION * share),
             is_canceled,
             smooths_edges=smooths_edges,
+            glass=glass_of(look),
         )
-        picture = Picture(transfer, next(iter(transfer.views)), self.cache)
+        picture = Picture(transfer, next(iter(transfer.views)), self.cache, make_static_view=self.make_static_view)
         picture.set_look(look, solo=self.solo)
         render_exact(
             picture, look, lambda share: progress(TRACING_FRACTION + (1 - TRACING_FRACTION) * share), is_canceled

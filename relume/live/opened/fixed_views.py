@@ -17,6 +17,7 @@ from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
 from relume.brdf.albedo import Reflectances
 from relume.brdf.lobe_sampling import LobeSampling
+from relume.camera.glass_passages import GlassPassages, trace_passages
 from relume.core.cache import Cache
 from relume.core.digest import digest
 from relume.core.errors import ParameterError, StoreError
@@ -48,7 +49,8 @@ from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import SampleSplitter
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete, validate
+from relume.look.glass import GlassOfLook, glass_of
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
@@ -81,6 +83,7 @@ class BakedFixedViews:
         cache: cache of results computed from the bake.
         key: path of the store; identifies this bake's entries in the cache.
         default_look: the complete look of the scene as it was imported.
+        glass: the glass that rays have met: that of `default_look`, or edited glass.
     """
 
     cache: Cache
@@ -90,6 +93,7 @@ class BakedFixedViews:
     method: str
     num_lights: int
     default_look: dict[str, Any]
+    glass: GlassOfLook
     material_names: Sequence[str]
     views: dict[str, View]
 
@@ -416,6 +420,14 @@ class BakedFixedViews:
         store, key = DownsampledStore(self.store, index, step), f"{self.key}/{step}"
         return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.cache, key)})
 
+    def glass_passages(self, view: View) -> GlassPassages:
+        """Return the glass in front of each pixel of a view. See `FixedViewTransfer`."""
+
+        def trace() -> GlassPassages:
+            return trace_passages(self.tracer.geometry, view.camera, (view.width, view.height))
+
+        return self.cache.transient.get_value((self.key, "glass passages", view.name), trace)
+
     def is_emissive_at(self, view: View, material: int) -> Shaped[NDArray[np.bool_], " n"]:
         """True for samples of an emissive material that are visible from an emissive side."""
         return self.local.is_emissive_at(
@@ -502,6 +514,7 @@ def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, A
     """
     attributes = store.attributes
     try:
+        default_look = complete({}, attributes["look"])
         return {
             "cache": cache,
             "key": key,
@@ -509,7 +522,8 @@ def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, A
             "scene_id": attributes["scene"],
             "method": attributes["method"],
             "num_lights": attributes["num_lights"],
-            "default_look": complete({}, attributes["look"]),
+            "default_look": default_look,
+            "glass": glass_of(validate(default_look, default_look)),
             "material_names": tuple(attributes["materials"]),
             "views": {},
         }

@@ -32,6 +32,7 @@ from relume.live.opened.prefiltered_environments import PrefilteredEnvironments
 from relume.live.opened.stored_patches import read_patches
 from relume.live.opened.sun_extraction import SunExtractor
 from relume.look import EnvironmentKey, LightGeometry
+from relume.look.glass import GlassOfLook
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
 from relume.methods.mirror_lights import read_mirror_lights
 from relume.methods.store_layout import read_free_camera_error
@@ -123,6 +124,11 @@ class BakedFreeCamera:
     def default_look(self) -> dict[str, Any]:
         """The complete look of the scene as it was imported."""
         return self.light_transport.default_look
+
+    @property
+    def glass(self) -> GlassOfLook:
+        """The glass that rays have met."""
+        return self.light_transport.glass
 
     @property
     def material_names(self) -> Sequence[str]:

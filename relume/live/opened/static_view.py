@@ -1,19 +1,19 @@
-"""Static views: a fixed view traced in memory when a free camera stops.
+"""Static views: a fixed view traced in memory when a free camera stops, or when a look edits glass.
 
-Light triangles, patches and their visibility are in the free-camera bake already. Only the view-dependent part is
-traced, by the stages of the method `gather`: view samples, their visible lights, their gather hits. A static view is as
-exact as `gather`, and shares all results computed from the bake's light.
+Light triangles, patches and their visibility are in the bake already. Only the view-dependent part is traced, by the
+stages of the method `gather`: view samples, their visible lights, their gather hits. A static view is as exact as
+`gather`, and shares all results computed from the bake's light. Glass that a look edits stops other rays, so the rays
+of patches are traced again as well, once for all views (`relume.live.opened.edited_glass`).
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import threading
-from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import IO, Any
+from itertools import chain
+from typing import Self, cast
 
 import numpy as np
 from jaxtyping import Shaped
@@ -21,48 +21,30 @@ from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.fixed_camera.protocols import OpenBake
+from relume.live.opened.edited_glass import ViewMethod, light_through_glass
+from relume.live.opened.extended_store import ExtendedStore, split_tasks
+from relume.live.opened.fixed_views import BakedFixedViews
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import LobeTracer
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.samples import SelectedSamples
+from relume.look.glass import GlassOfLook, with_glass
+from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
 from relume.operators.image_cache import ImageFiles
 from relume.scene.custom_camera import with_cameras
 from relume.scene.model import Camera, Scene
-from relume.store.bake_protocol import Recipe, StoreReader, Task
+from relume.store.bake_protocol import Recipe, Task
 from relume.views.view import View, open_view
 
 # a fifth of a bake's rays, both lattices of Fibonacci size; their light is shared with more neighbors
 _RAYS, _GLOSSY_RAYS, _NUM_TENT_PASSES = 123, 34, 2
 _ROWS_PER_TASK = 4096  # at most half a second of work, which bounds the time to cancel
 _SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the stage between these is in the bake
-
-
-class ExtendedStore:
-    """A read-only store extended in memory by the arrays of one view, with index 0; a `TaskStore`."""
-
-    def __init__(self, store: StoreReader, attributes: Mapping[str, Any]) -> None:
-        self._store, self._attributes = store, {**store.attributes, **attributes}
-        self.arrays: dict[str, NDArray[Any]] = {}
-
-    @property
-    def attributes(self) -> Mapping[str, Any]:
-        """Attributes of the store, overridden by those of the view."""
-        return self._attributes
-
-    def shape(self, path: str) -> tuple[int, ...]:
-        """Shape of an array."""
-        return self.arrays[path].shape if path in self.arrays else self._store.shape(path)
-
-    def scratch(self) -> IO[bytes]:
-        """Return a scratch file in memory, where the whole view is held."""
-        return io.BytesIO()
-
-    def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Rows [start, stop) of the array at a path."""
-        array = self.arrays.get(path)
-        return self._store.read(path, start, stop) if array is None else array[start:stop]
+_LIGHT_FRACTION = 0.3  # of the progress of a view with edited glass; the rest is the view
 
 
 @dataclass(frozen=True)
@@ -78,18 +60,21 @@ class StaticView(BakedIndirectViews):
     reflects: bool
 
     @classmethod
-    def from_bake(cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool) -> StaticView:
+    def from_bake(
+        cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool, glass: GlassOfLook
+    ) -> StaticView:
         """Open the view of an extended store.
 
         Args:
             light_transport: the light of the bake. store: over the bake's. reflects: True if it has gather rays.
+            glass: that its camera rays have met.
         """
         view = open_view(store, 0, light_transport.cache, light_transport.key)
         bake_fields = {
             bake_field.name: getattr(light_transport, bake_field.name) for bake_field in fields(BakedIndirectViews)
         }
         return cls(
-            **{**bake_fields, "store": store, "views": {view.name: view}},
+            **{**bake_fields, "store": store, "views": {view.name: view}, "glass": glass},
             light_transport=light_transport,
             reflects=reflects,
         )
@@ -130,21 +115,22 @@ class StaticTracing:
         store: for the view's arrays.
     """
 
-    def __init__(self, method: GatherMethod, scene: Scene, recipe: Recipe, store: ExtendedStore) -> None:
+    def __init__(self, method: ViewMethod, scene: Scene, recipe: Recipe, store: ExtendedStore) -> None:
         self._method, self._scene, self._recipe, self.store = method, scene, recipe, store
         sampling = Task(_SAMPLE_STAGE, 1, recipe.views[0], 0, 0)
         sampled_arrays = method.compute(scene, recipe, sampling, store).arrays
         store.arrays.update({path: np.asarray(rows) for path, rows in sampled_arrays.items()})
-        for stage in (_SHADOW_STAGE, _HIT_STAGE):
-            view_specs = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
-            store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in view_specs})
+        view_stages = [stage for stage in (_SHADOW_STAGE, _HIT_STAGE) if stage < len(method.stages)]
+        for stage in view_stages:
+            store.allocate(s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
         # includes the seeds of local lights' shadows, which do not need gather rays
-        seeds = store.arrays["views/0/seed"]
-        seeds[:] = np.arange(len(seeds))
-        shadow_tasks, hit_tasks = (
-            list(_split_tasks(method.tasks(k, scene, recipe, store))) for k in (_SHADOW_STAGE, _HIT_STAGE)
+        if (seeds := store.arrays.get("views/0/seed")) is not None:
+            seeds[:] = np.arange(len(seeds))
+        shadow_tasks, *hit_tasks = (
+            list(split_tasks((t for t in method.tasks(k, scene, recipe, store) if t.group), _ROWS_PER_TASK))
+            for k in view_stages
         )
-        self._tasks, self._num_shadow_tasks = shadow_tasks + hit_tasks, len(shadow_tasks)
+        self._tasks, self._num_shadow_tasks = [*shadow_tasks, *chain(*hit_tasks)], len(shadow_tasks)
         self._num_done, self._lock = 0, threading.Lock()
 
     @property
@@ -173,23 +159,30 @@ class StaticTracing:
                 self._num_done += 1
 
     def _trace(self, task: Task) -> None:
-        arrays = self.store.arrays
-        for path, rows in self._method.compute(self._scene, self._recipe, task, self.store).arrays.items():
-            if path in arrays:
-                arrays[path][task.start : task.stop] = rows
+        self.store.write(task, self._method.compute(self._scene, self._recipe, task, self.store))
 
 
 class StaticViewBuilder:
-    """Traces static views of one free-camera bake.
+    """Traces static views of one bake.
 
     Args:
         light_transport: the light of the bake. scene: that was baked.
     """
 
-    def __init__(self, light_transport: BakedIndirectViews, scene: Scene) -> None:
+    def __init__(self, light_transport: BakedFixedViews, scene: Scene) -> None:
         self._light_transport, self._scene = light_transport, scene
-        self._smooth = GatherMethod(_RAYS, _GLOSSY_RAYS, num_tent_passes=_NUM_TENT_PASSES)
-        self._sparse = GatherMethod(_RAYS, _GLOSSY_RAYS, num_tent_passes=_NUM_TENT_PASSES, smooths_edges=False)
+        self._smooth, self._sparse = (
+            GatherMethod(_RAYS, _GLOSSY_RAYS, num_tent_passes=_NUM_TENT_PASSES, smooths_edges=smooths_edges)
+            if isinstance(light_transport, BakedIndirectViews)
+            else DirectMethod(smooths_edges=smooths_edges)
+            for smooths_edges in (True, False)
+        )
+
+    @classmethod
+    def from_bake(cls, bake: OpenBake, scene: Scene) -> Self:
+        """Make the builder of any open bake. scene: that was baked"""
+        fixed = bake.light_transport if isinstance(bake, BakedFreeCamera) else bake
+        return cls(cast("BakedFixedViews", fixed), scene)
 
     def make_static_view(
         self,
@@ -200,44 +193,66 @@ class StaticViewBuilder:
         is_canceled: CancelCheck,
         *,
         smooths_edges: bool = True,
-    ) -> StaticView:
+        glass: GlassOfLook | None = None,
+    ) -> BakedFixedViews:
         """Trace a static view, as far as it is not cached.
 
         Args:
             camera: the pose. size: width and height, pixels. reflects: includes indirect illumination.
             progress: called with the completed fraction. is_canceled: polled.
             smooths_edges: whether pixels on edges have several samples; else each has one at its center.
+            glass: that rays meet; None: the scene's own.
         Raises:
             CancelledError: `is_canceled` returned True.
             MemoryBudgetError: the view exceeds the memory budget.
         """
-        cache, name = self._light_transport.cache.transient, _view_name(camera, size, smooths_edges)
-        key = self._light_transport.key, "static view", name
+        light_transport, scene = self._light_transport, self._scene
+        method = self._smooth if smooths_edges else self._sparse
+        glass = light_transport.glass if glass is None else glass
+        if glass != light_transport.glass:
+            scene = with_glass(scene, glass)
+            light_transport = light_through_glass(
+                light_transport, method, scene, _part(progress, 0, _LIGHT_FRACTION), is_canceled
+            )
+            progress = _part(progress, _LIGHT_FRACTION, 1)
+        name = _view_name(camera, size, smooths_edges, scene)
+        key = light_transport.key, "static view", name
+        cache = light_transport.cache.transient
         tracing = cache.get_cached(key, StaticTracing)
         if tracing is None:
-            new_tracing = self._start_tracing(
-                self._smooth if smooths_edges else self._sparse, replace(camera, name=name), size
-            )
+            new_tracing = _start_tracing(method, light_transport, scene, replace(camera, name=name), size, is_canceled)
             tracing = cache.get(key, StaticTracing, new_tracing.num_bytes, lambda: new_tracing)
         tracing.complete_tracing(reflects, progress, is_canceled)
-        return StaticView.from_bake(self._light_transport, tracing.store, reflects)
-
-    def _start_tracing(self, method: GatherMethod, camera: Camera, size: tuple[int, int]) -> StaticTracing:
-        recipe = Recipe(method.name, (camera.name,), size, self._light_transport.num_lights)
-        scene = with_cameras(self._scene, [camera])
-        store = ExtendedStore(self._light_transport.store, method.attributes(scene, recipe))
-        return StaticTracing(method, scene, recipe, store)
+        if isinstance(light_transport, BakedIndirectViews):
+            return StaticView.from_bake(light_transport, tracing.store, reflects, glass)
+        view = open_view(tracing.store, 0, light_transport.cache, light_transport.key)
+        return replace(light_transport, store=tracing.store, views={view.name: view}, glass=glass)
 
 
-def _split_tasks(tasks: Iterable[Task]) -> Iterator[Task]:
-    """Split the view's tasks so that each is short enough for a cancellation to wait for."""
-    for task in tasks:
-        if task.group:
-            for start in range(task.start, task.stop, _ROWS_PER_TASK):
-                yield replace(task, start=start, stop=min(start + _ROWS_PER_TASK, task.stop))
+def _start_tracing(
+    method: ViewMethod,
+    light_transport: BakedFixedViews,
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    is_canceled: CancelCheck,
+) -> StaticTracing:
+    """Find the samples of a view. Raises CancelledError if `is_canceled` returned true."""
+    recipe = Recipe(method.name, (camera.name,), size, light_transport.num_lights)
+    scene = with_cameras(scene, [camera])
+    store = ExtendedStore(light_transport.store, method.attributes(scene, recipe))
+    store.is_canceled = is_canceled
+    tracing = StaticTracing(method, scene, recipe, store)
+    store.is_canceled = lambda: False  # each task of the rest is short
+    return tracing
 
 
-def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool) -> str:
+def _part(progress: ProgressCallback, start: float, stop: float) -> ProgressCallback:
+    """Report the progress of a part of the work, from one fraction of all to another."""
+    return lambda share: progress(start + (stop - start) * share)
+
+
+def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool, scene: Scene) -> str:
     """Return a unique name of a camera's static view, which identifies its images in the cache."""
-    identity = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges)).encode()
+    identity = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges, scene.id)).encode()
     return f"{camera.name} {hashlib.sha256(identity).hexdigest()[:16]}"

@@ -29,7 +29,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.live.free_camera.progressive_picture import ProgressivePicture
     from relume.live.opened.openers import open_bake
     from relume.live.opened.static_view import StaticViewBuilder
-    from relume.output.render_image import render_image, render_small
+    from relume.output.render_image import needs_tracing, render_image, render_small
     from relume.output.viewport import Viewport
     from relume.reference import render_reference
     from relume.scene.custom_camera import with_cameras
@@ -49,21 +49,20 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         scene = scene_path_of_bake(Path(transfer.key), transfer.scene_id)
         return memory.transient.get_value(
             (transfer.key, "scene"),
-            lambda: StaticViewBuilder(transfer.light_transport, load_scene(fetch_if_missing(scene))),
+            lambda: StaticViewBuilder.from_bake(transfer, load_scene(fetch_if_missing(scene))),
         )
 
     def make_picture(transfer: Any, view: str) -> Any:
-        if transfer.camera_mode is not CameraMode.FREE:
-            return Picture(transfer, view, memory, is_watched=True)
-
         def make_static_view(*camera_args: Any, **options: Any) -> Any:
             # in the job's thread, because reading a scene takes long
             return static_view_builder(transfer).make_static_view(*camera_args, **options)
 
+        if transfer.camera_mode is not CameraMode.FREE:
+            return Picture(transfer, view, memory, is_watched=True, make_static_view=make_static_view)
         return ProgressivePicture(FreeCameraPicture(transfer, view, is_watched=True), make_static_view, memory)
 
     def render(transfer: Any, view: str, look: Any, *, exact: bool = True, **options: Any) -> Any:
-        static_views = static_view_builder(transfer) if exact and transfer.camera_mode is CameraMode.FREE else None
+        static_views = static_view_builder(transfer) if exact and needs_tracing(transfer, look) else None
         return render_image(transfer, view, look, static_views=static_views, **options)
 
     image_code()  # of the running version: its files may be replaced meanwhile

@@ -39,7 +39,7 @@ class SceneMaterial(Body):
 
     `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no
     texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks
-    cannot change it.
+    edit its glass, but cannot make other materials transmit.
     """
 
     name: str

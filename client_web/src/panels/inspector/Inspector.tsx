@@ -18,6 +18,7 @@ import type { Term } from "../../protocol";
 import { IconButton } from "../../ui/IconButton";
 import { Section } from "../../ui/Section";
 import { AlbedoInfo } from "./AlbedoInfo";
+import { GlassControls } from "./glass/GlassControls";
 import { TermCard } from "./TermCard";
 import { defaultTerm, isMirror, modelsFor } from "./terms";
 
@@ -86,12 +87,6 @@ function ShadowCatcherToggle({ material }: { material: string }) {
   );
 }
 
-/** Note about the editable part of glass. */
-function GlassToggle({ material }: { material: string }) {
-  if (materialOf(material)?.is_glass !== true) return null;
-  return <p class="aside">Glass: edit its reflection here. Transmission stays as in the scene file.</p>;
-}
-
 export function Inspector() {
   const [light, displayedMaterial] = [openLight.value, selectedLight.value];
   if (light !== null && displayedMaterial !== null)
@@ -132,7 +127,6 @@ function MaterialInspector() {
         />
       </header>
       <ShadowCatcherToggle material={material} />
-      <GlassToggle material={material} />
       <CausticsNote material={material} terms={selectedTerms.value} />
       {!isShadowCatcher && <BaseColorImage key={material} material={material} terms={selectedTerms.value} />}
       {!isShadowCatcher &&
@@ -157,6 +151,9 @@ function MaterialInspector() {
             }
           />
         ))}
+      {!isShadowCatcher && materialLook !== undefined && (
+        <GlassControls material={material} materialLook={materialLook} original={original} />
+      )}
       {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
       {!isShadowCatcher && <AddTerm material={material} />}
       {!isShadowCatcher && materialLook !== undefined && (

@@ -1,0 +1,77 @@
+"""The light of a bake through glass that a look edits: its patches, traced again by the stages that baked them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from relume.core.digest import digest
+from relume.core.errors import CancelledError
+from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.opened.extended_store import ExtendedStore, split_tasks
+from relume.live.opened.fixed_views import BakedFixedViews
+from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.stored_patches import read_patches
+from relume.methods.direct import DirectMethod
+from relume.methods.gather import GatherMethod
+from relume.raytrace.alpha_test import collect_alpha_masks
+from relume.scene.model import Scene
+from relume.store.bake_protocol import Recipe
+
+ViewMethod = GatherMethod | DirectMethod
+Transport = TypeVar("Transport", bound=BakedFixedViews)
+
+_RAY_STAGE = 3  # of `gather`
+_PATCHES_PER_TASK = 256  # at most half a second of work, which bounds the time to cancel
+
+
+def light_through_glass(
+    light_transport: Transport,
+    method: ViewMethod,
+    scene: Scene,
+    progress: ProgressCallback,
+    is_canceled: CancelCheck,
+) -> Transport:
+    """Return the light of a bake as if its scene had other glass, without views; the same if its shadows are the same.
+
+    Args:
+        light_transport: the light of the bake. method: traces its rays. scene: with that glass.
+        progress: called with the completed fraction. is_canceled: polled.
+    Raises:
+        CancelledError: `is_canceled` returned true.
+    """
+    masks = collect_alpha_masks(scene.materials)
+    assert masks is not None  # there is glass
+    if np.array_equal(masks.rules, light_transport.store.read("alpha_masks/rules")):  # only camera rays differ
+        return light_transport
+
+    def trace() -> Transport:
+        store = ExtendedStore(light_transport.store, {"views": []})
+        store.arrays["alpha_masks/rules"] = masks.rules
+        key = f"{light_transport.key}/glass-{digest(masks.rules.tobytes())[:16]}"
+        fields: dict[str, Any] = {"store": store, "key": key, "views": {}}
+        if isinstance(light_transport, BakedIndirectViews):
+            assert isinstance(method, GatherMethod)
+            _trace_patches(method, scene, store, progress, is_canceled)
+            return replace(light_transport, **fields, patches=read_patches(store))
+        return replace(light_transport, **fields)
+
+    cache_key = light_transport.key, "light through edited glass", masks.rules.tobytes()
+    return light_transport.cache.transient.get_value(cache_key, trace)
+
+
+def _trace_patches(
+    method: GatherMethod, scene: Scene, store: ExtendedStore, progress: ProgressCallback, is_canceled: CancelCheck
+) -> None:
+    """Trace the rays of all patches."""
+    width, height = store.attributes["size"]
+    recipe = Recipe(method.name, (), (width, height), store.attributes["num_lights"])
+    store.allocate(method.arrays(_RAY_STAGE, scene, recipe, store))
+    tasks = list(split_tasks(method.tasks(_RAY_STAGE, scene, recipe, store), _PATCHES_PER_TASK))
+    for k, task in enumerate(tasks):
+        if is_canceled():
+            raise CancelledError("the light through the edited glass was canceled")
+        progress(k / len(tasks))
+        store.write(task, method.compute(scene, recipe, task, store))
