@@ -11,17 +11,22 @@ from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad,
 
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.brdf.fresnel import schlick
+from relume.brdf.lobe_sampling import sample_lobe
+from relume.brdf.roughness_levels import NO_LEVELS
 from relume.camera.planar_mirrors import find_planar_mirrors, lights_visible_in_mirrors
 from relume.core.cache import Cache
+from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
 from relume.live.opened.openers import open_bake, open_transfer
 from relume.live.opened.static_view import StaticViewBuilder
+from relume.look.document import MAX_BOUNCES
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
+from relume.transport.shading_points import MirrorRays
 
 F0, COLOR, ALBEDO, ROWS = 0.7, 0.8, 0.6, 64
 MIRROR = Material("Mirror", ({"model": "ggx", "color": [COLOR] * 3, "params": {"roughness": 0.03, "f0": F0}},))
@@ -171,3 +176,16 @@ def test_a_color_edit_of_the_mirror_updates_its_reflected_light(lit):
         exact = render_image(lit, "front", colored(color))
         assert 1e-6 < relative_rmse(picture.image(), exact) < 0.01
     assert relative_rmse(run_until_exact(picture).image(), exact) < 1e-6
+
+
+@pytest.mark.parametrize(("bounces", "is_lit"), [(1, True), (MAX_BOUNCES, False)])
+def test_a_narrow_lobe_whose_rays_follow_the_mirror_does_not_see_its_lights_again(lit, bounces, is_lit):
+    def change(document):
+        document["transport"]["bounces"] = bounces
+
+    light = illumination_from_look(make_look(lit, change), lit.material_names, has_bounces=True)
+    metal = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.1, "f0": 0.9}}
+    samples = lit.samples(lit.views["front"], 1, lit.cache)
+    _, receivers = lit.incident_light(samples, light, lobe=sample_lobe(metal, NO_LEVELS))
+    (mirrored,) = (rays for rays in receivers.rays if isinstance(rays, MirrorRays))
+    assert (mirrored.normal_irradiance.max() > 0) == is_lit
