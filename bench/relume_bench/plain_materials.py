@@ -201,7 +201,7 @@ def _uv_sets(description: Any) -> Iterator[int]:
         if key.endswith("Texture") and isinstance(value, dict):
             transform = value.get("extensions", {}).get("KHR_texture_transform")
             overriding = transform if isinstance(transform, dict) else {}
-            yield int(overriding.get("texCoord", value.get("texCoord", 0)))
+            yield {**value, **overriding}.get("texCoord", 0)
         elif isinstance(value, dict):
             yield from _uv_sets(value)
 

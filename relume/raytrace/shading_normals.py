@@ -47,7 +47,7 @@ def mean_normal(
     mean = np.empty((len(uv), 3), np.float32)
     for k, nums in ((-1, (1, 1)), *enumerate(_LOOKUPS)):
         rows = np.flatnonzero(shape == k)
-        total, footprint = np.zeros((len(rows), 3), np.float32), (extent[rows] / np.float32(nums)).max(axis=1)
+        total, footprint = np.zeros((len(rows), 3), np.float32), (extent[rows] / np.array(nums, np.float32)).max(axis=1)
         for s, t in np.ndindex(*nums):
             offset = ((s + 0.5) / nums[0] - 0.5) * sides[rows, 0] + ((t + 0.5) / nums[1] - 0.5) * sides[rows, 1]
             mapped = pyramid.sample(np.asarray(uv[rows] + offset, np.float32), footprint)

@@ -60,7 +60,8 @@ class TexturedColors:
         """Copy an image of the material into the blocks, with the wrap modes then; without blocks it stays."""
         if self.texel_uvs is None:
             return pixels, wrap
-        reduced = _resized(pixels, tuple(max(1, side // self.reduction) for side in pixels.shape[:2]), "BOX")
+        height, width = (max(1, side // self.reduction) for side in pixels.shape[:2])
+        reduced = _resized(pixels, (height, width), "BOX")
         placed = np.empty((*self.texel_uvs.shape[:2], pixels.shape[2]), np.uint8)
         for start in range(0, len(placed), ROWS_PER_BATCH):
             rows = slice(start, start + ROWS_PER_BATCH)
@@ -209,21 +210,21 @@ def _draw_blocks(uvs: F32, colors: F32, size: tuple[int, int]) -> TexturedColors
         if reduction > _MAX_REDUCTION:
             return None
         sides = _block_sides(along, down, (size[0] // reduction, size[1] // reduction), smallest)
-    sides = sides.astype(np.int64)
-    num_texels = sides.prod(axis=1)
-    corner, width, height = _pack(sides)
+    whole = np.asarray(sides, np.int64)
+    num_texels = whole.prod(axis=1)
+    corner, width, height = _pack(whole)
     image, texel_uvs = np.full((height, width, 4), 255, np.uint8), np.zeros((height, width, 2), np.float32)
     for batch in np.split(
         np.arange(len(uvs)), np.flatnonzero(np.diff(num_texels.cumsum() // _BLOCK_TEXELS_AT_ONCE)) + 1
     ):
         t = np.repeat(batch, num_texels[batch])
         within = np.arange(len(t)) - np.repeat(num_texels[batch].cumsum() - num_texels[batch], num_texels[batch])
-        i, j = within % sides[t, 0], within // sides[t, 0]
-        u, v = (i / (sides[t, 0] - 1))[:, None], (j / (sides[t, 1] - 1))[:, None]
+        i, j = within % whole[t, 0], within // whole[t, 0]
+        u, v = (i / (whole[t, 0] - 1))[:, None], (j / (whole[t, 1] - 1))[:, None]
         place = corner[t, 1] + j, corner[t, 0] + i
         texel_uvs[place] = first[t] + u * along[t] + v * down[t]
         image[place] = _to_bytes(np.clip(color[t] + u * color_along[t] + v * color_down[t], 0, 1))
-    ends = np.array([[0, 0], [1, 0], [0, 1]]) * (sides[:, None] - 1)
+    ends = np.array([[0, 0], [1, 0], [0, 1]]) * (whole[:, None] - 1)
     corner_uvs = (corner[:, None] + 0.5 + ends) / [width, height]
     return TexturedColors(image, ("clamp", "clamp"), texel_uvs, reduction, corner_uvs.astype(np.float32))
 
@@ -231,7 +232,7 @@ def _draw_blocks(uvs: F32, colors: F32, size: tuple[int, int]) -> TexturedColors
 def _block_sides(along: F32, down: F32, size: tuple[int, int], smallest: int) -> Shaped[F64, "triangles 2"]:
     """Width and height of blocks that have as many texels as the image has on the triangles; whole numbers."""
     texels = np.stack([np.hypot(*(side * np.array([size[1], size[0]])).T) for side in (along, down)], axis=1)
-    return np.maximum(np.ceil(texels) + 1, smallest)
+    return np.asarray(np.maximum(np.ceil(texels) + 1, smallest), np.float64)
 
 
 def _pack(sides: Shaped[I64, "blocks 2"]) -> tuple[Shaped[I64, "blocks 2"], int, int]:
@@ -256,7 +257,7 @@ def _to_bytes(colors: Shaped[NDArray[np.floating], "*batch 4"]) -> Shaped[U8, "*
     return np.round(255 * np.concatenate([srgb_encode(values[..., :3]), values[..., 3:]], axis=-1)).astype(np.uint8)
 
 
-def _resized(pixels: U8, size: tuple[int, ...], filter_name: str) -> U8:
+def _resized(pixels: U8, size: tuple[int, int], filter_name: str) -> U8:
     """Resize an image, channel by channel: Pillow would multiply colors by alpha. size: height and width."""
     if pixels.shape[:2] == size:
         return pixels

@@ -129,7 +129,7 @@ class MaterialReader:
         return ReadMaterial(scene_material, slot, anisotropy_rotation, self._emission(material, extensions, label))
 
     def texture_layout(self, material: GltfMaterial) -> TextureLayout | None:
-        """Where the textures of a material are; None if it has none that are used as images."""
+        """Find where the textures of a material are; None if it has none that are used as images."""
         label = f"material {quote(material.name or 'material')}"
         extensions = read_extensions(material.extensions, label, [])
         infos = [info for info in _infos(material, extensions) if info is not None]
