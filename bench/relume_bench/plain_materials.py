@@ -196,8 +196,10 @@ class Materials:
 
 
 def _uv_sets(description: Any) -> Iterator[int]:
-    """Sets of texture coordinates that the textures in a description refer to."""
+    """Sets of texture coordinates that the textures in a description refer to; occlusion is not rendered."""
     for key, value in description.items():
+        if key == "occlusionTexture":
+            continue
         if key.endswith("Texture") and isinstance(value, dict):
             transform = value.get("extensions", {}).get("KHR_texture_transform")
             overriding = transform if isinstance(transform, dict) else {}

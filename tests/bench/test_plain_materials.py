@@ -97,6 +97,7 @@ def test_alpha_of_vertex_colors_multiplies_opacity() -> None:
 def test_texture_coordinates_are_the_set_that_textures_name() -> None:
     sets = {f"TEXCOORD_{k}": np.full((3, 2), k, np.float32) for k in range(2)}
     material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}}}
+    material["occlusionTexture"] = {"index": 0}
     assert Materials(File({"materials": [material]}, Path())).uv_set(0) == 1
     transform = {"KHR_texture_transform": {"texCoord": 0}}
     material["normalTexture"] = {"index": 0, "texCoord": 1, "extensions": transform}
