@@ -154,7 +154,7 @@ def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
     attributes["POSITION"] = (positions @ linear.T + to_world[:3, 3]).astype(np.float32)
     triangles = triangles[:, ::-1] if mirrored else triangles
     if "NORMAL" in attributes:
-        attributes["NORMAL"] = unit(attributes["NORMAL"] @ np.linalg.inv(linear))
+        attributes["NORMAL"] = _complete_normals(attributes["NORMAL"] @ np.linalg.inv(linear), attributes, triangles)
     else:
         attributes, triangles = _make_flat(attributes, triangles)
     if "TANGENT" in attributes:
@@ -164,6 +164,16 @@ def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
         )
         attributes["TANGENT"] = np.concatenate([along, handedness], axis=1).astype(np.float32)
     return Shape(attributes, np.ascontiguousarray(triangles), primitive.get("material"))
+
+
+def _complete_normals(normals: NDArray[Any], attributes: dict[str, F32], faces: NDArray[np.uint32]) -> F32:
+    """Unit normals; those without length, which the format forbids, are means of the triangles' around."""
+    corners = attributes["POSITION"][faces]
+    around = np.zeros_like(normals)
+    for corner in range(3):
+        np.add.at(around, faces[:, corner], np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    has_length = np.linalg.norm(normals, axis=1, keepdims=True) > 1e-6
+    return unit(np.where(has_length, normals, around))
 
 
 def _strip(corners: NDArray[np.uint32]) -> NDArray[np.uint32]:

@@ -36,7 +36,8 @@ def make_job(file: File) -> tuple[dict[str, Any], dict[str, Any]]:
             f"normals_{k}": attributes["NORMAL"],
             f"faces_{k}": shape.faces,
         }
-        arrays[f"uvs_{k}"] = attributes.get("TEXCOORD_0", np.zeros((num, 2), np.float32))
+        uv_set = f"TEXCOORD_{materials.uv_set(shape.material)}"
+        arrays[f"uvs_{k}"] = attributes.get(uv_set, np.zeros((num, 2), np.float32))
         if "TANGENT" in attributes:
             arrays |= {
                 f"tangent_of_{k}": attributes["TANGENT"][:, :3] * 0.5 + 0.5,
@@ -44,6 +45,8 @@ def make_job(file: File) -> tuple[dict[str, Any], dict[str, Any]]:
             }
         if "COLOR_0" in attributes:
             arrays[f"colors_of_{k}"] = np.ascontiguousarray(attributes["COLOR_0"][:, :3])
+            if attributes["COLOR_0"].shape[1] == 4:
+                arrays[f"alpha_of_{k}"] = np.ascontiguousarray(attributes["COLOR_0"][:, 3:])
         bsdfs.append(materials.bsdf(shape.material, attributes))
     job = {
         "integrator": {"type": "volpath", "max_depth": _DEPTH, "rr_depth": _RR_DEPTH}, "bsdfs": bsdfs,

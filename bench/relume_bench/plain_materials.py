@@ -5,7 +5,7 @@ Glass is the peer's own dielectric: thin if the file has no thickness, otherwise
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,14 @@ class Materials:
         self._file = file
         self.arrays: dict[str, F32] = {}
 
+    def uv_set(self, number: int | None) -> int:
+        """Set of texture coordinates that a material's textures use. Raises ValueError if they use several."""
+        description = {} if number is None else self._file.json["materials"][number]
+        sets = set(_uv_sets(description))
+        if len(sets) > 1:
+            raise ValueError("materials with several sets of texture coordinates are not in these files")
+        return sets.pop() if sets else 0
+
     def bsdf(self, number: int | None, has: Mapping[str, Any]) -> Description:
         """A complete material with its emission.
 
@@ -46,6 +54,11 @@ class Materials:
             return self._transmitting(description, pbr, name, transmission, whole)
         if description.get("alphaMode", "OPAQUE") != "OPAQUE":
             whole = {"type": "mask", "opacity": self._opacity(description, pbr, name), "content": whole}
+            if "COLOR_0" in has and (has["COLOR_0"][:, 3:] < 1).any():
+                if description["alphaMode"] == "MASK":
+                    raise ValueError("masks with transparent vertex colors are not in these files")
+                alpha = {"type": "mesh_attribute", "name": "vertex_alpha"}
+                whole = {"type": "mask", "opacity": alpha, "content": whole}
         return {**whole, "sides": True, **self._make_emitter(description, name)}
 
     def _reflecting(self, description: Description, pbr: Description, name: str, has: Mapping[str, Any]) -> Description:
@@ -180,6 +193,19 @@ class Materials:
             "alpha": texture,
             "int_ior": max(ior, _LEAST_FROSTED_IOR),
         }
+
+
+def _uv_sets(description: Any) -> Iterator[int]:
+    """Sets of texture coordinates that the textures in a description refer to; occlusion is not rendered."""
+    for key, value in description.items():
+        if key == "occlusionTexture":
+            continue
+        if key.endswith("Texture") and isinstance(value, dict):
+            transform = value.get("extensions", {}).get("KHR_texture_transform")
+            overriding = transform if isinstance(transform, dict) else {}
+            yield {**value, **overriding}.get("texCoord", 0)
+        elif isinstance(value, dict):
+            yield from _uv_sets(value)
 
 
 def _extension(description: Description, kind: str) -> Description:

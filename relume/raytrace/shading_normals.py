@@ -12,7 +12,7 @@ from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
 
-_SIDE_SAMPLES = 4  # of normal maps, along each side of a pixel
+_LOOKUPS = ((1, 16), (2, 8), (4, 4), (8, 2), (16, 1))  # of normal maps, along both sides of a pixel, by its shape
 _UP = np.array([[0, 0, 1]], np.float32)
 MIN_FACING = 0.01  # minimum cosine between a shading normal and the direction to the viewer
 
@@ -39,17 +39,21 @@ def mean_normal(
         texture: the normal map. uv: v from the top. sides: of each pixel's parallelogram in UV space.
     """
     pyramid = MipMap.for_texture(texture)
-    side = np.linalg.norm(sides, axis=2).max(axis=1).astype(np.float32)
-    is_wide = pyramid.texels(side) > 1
+    extent = np.linalg.norm(sides, axis=2).astype(np.float32)
+    is_wide = pyramid.texels(extent.max(axis=1)) > 1
+    # the ratio of numbers is that of the sides: each lookup averages about a square
+    shape = np.rint(0.5 * np.log2(np.maximum(extent[:, 0], 1e-9) / np.maximum(extent[:, 1], 1e-9))) + 2
+    shape = np.where(is_wide, np.clip(shape, 0, len(_LOOKUPS) - 1), -1)
     mean = np.empty((len(uv), 3), np.float32)
-    for rows, num in ((np.flatnonzero(~is_wide), 1), (np.flatnonzero(is_wide), _SIDE_SAMPLES)):
-        total, footprint = np.zeros((len(rows), 3), np.float32), side[rows] / num
-        for s, t in np.ndindex(num, num):
-            offset = ((s + 0.5) / num - 0.5) * sides[rows, 0] + ((t + 0.5) / num - 0.5) * sides[rows, 1]
+    for k, nums in ((-1, (1, 1)), *enumerate(_LOOKUPS)):
+        rows = np.flatnonzero(shape == k)
+        total, footprint = np.zeros((len(rows), 3), np.float32), (extent[rows] / np.array(nums, np.float32)).max(axis=1)
+        for s, t in np.ndindex(*nums):
+            offset = ((s + 0.5) / nums[0] - 0.5) * sides[rows, 0] + ((t + 0.5) / nums[1] - 0.5) * sides[rows, 1]
             mapped = pyramid.sample(np.asarray(uv[rows] + offset, np.float32), footprint)
             length = visible_length(mapped, pyramid.texels(footprint))
             total += unit(mapped, _UP) * length[:, None]
-        mean[rows] = total / num**2
+        mean[rows] = total / (nums[0] * nums[1])
     return mean, np.minimum(np.linalg.norm(mean, axis=1), 1)
 
 

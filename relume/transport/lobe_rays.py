@@ -284,6 +284,24 @@ def isotropic_at(textured, patch, texels):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _add_directional(textured, patch, channel, texels, directional):  # type: ignore[no-untyped-def]
+    """Radiance of a patch in one channel, isotropic and directional.
+
+    A low degree rings, and a texture can be many times its mean: the light that rings belong to limits how dark they
+    are. That is the light of the textured highlights, or all light if highlights have no texture.
+
+    Args:
+        textured, patch, texels: as in `from_patch`. channel: index.
+        directional: radiance of the directional part, without the texture.
+    """
+    diffuse, specular = texels[0][channel], texels[1][channel]
+    even = textured.plain[patch, channel] + textured.by_diffuse[patch, channel] * diffuse
+    highlight = textured.by_specular[patch, channel] * specular
+    least = _ZERO if highlight > 0 else -even
+    return even + max(highlight + specular * textured.per_specular[patch, channel] * directional, least)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def from_patch(outgoing, textured, patch, texels, world):  # type: ignore[no-untyped-def]
     """Radiance of a patch at a point of it.
 
@@ -291,14 +309,16 @@ def from_patch(outgoing, textured, patch, texels, world):  # type: ignore[no-unt
         outgoing, textured: of `LobeRays`. patch: index. texels: from `texels_at`.
         world: direction toward the patch, world space.
     """
-    red, green, blue = isotropic_at(textured, patch, texels)
     row = outgoing.lobe[patch] if outgoing.smooth.shape[0] > 0 else -1
-    if row >= 0:
-        bin_index, (s, t, u), unit = bin_of(outgoing.frame, row, -world[0], -world[1], -world[2]), texels[1], textured
-        red += s * unit.per_specular[patch, 0] * outgoing.scale[row, 0] * outgoing.smooth[row, bin_index, 0]
-        green += t * unit.per_specular[patch, 1] * outgoing.scale[row, 1] * outgoing.smooth[row, bin_index, 1]
-        blue += u * unit.per_specular[patch, 2] * outgoing.scale[row, 2] * outgoing.smooth[row, bin_index, 2]
-    return red, green, blue
+    if row < 0:
+        return isotropic_at(textured, patch, texels)
+    bin_index = bin_of(outgoing.frame, row, -world[0], -world[1], -world[2])
+    scale, steps = outgoing.scale[row], outgoing.smooth[row, bin_index]
+    return (
+        _add_directional(textured, patch, 0, texels, scale[0] * steps[0]),
+        _add_directional(textured, patch, 1, texels, scale[1] * steps[1]),
+        _add_directional(textured, patch, 2, texels, scale[2] * steps[2]),
+    )
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")

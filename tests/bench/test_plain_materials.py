@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relume_bench.gltf_plain import _TRIANGLES, File, Shape
+from relume_bench.gltf_plain import _TRIANGLES, File, Shape, _complete_normals
 from relume_bench.plain_job import make_job
 from relume_bench.plain_materials import Materials
 
@@ -76,3 +76,40 @@ def test_surfaces_that_shine_on_both_sides_are_two(two_sided: bool, glow: float,
         a, b, c = arrays[f"positions_{k}"][arrays[f"faces_{k}"][0]]
         assert np.sign(np.cross(b - a, c - a)[2]) == normal
         assert num == 1 or np.sign(a[2]) == normal
+
+
+def triangle(**attributes: np.ndarray) -> Shape:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    return Shape(
+        {"POSITION": corners, "NORMAL": np.tile(np.float32([0, 0, 1]), (3, 1)), **attributes}, np.uint32([[0, 1, 2]]), 0
+    )
+
+
+def test_alpha_of_vertex_colors_multiplies_opacity() -> None:
+    file = File({"materials": [{"alphaMode": "BLEND"}]}, Path(), [triangle(COLOR_0=np.full((3, 4), 0.5, np.float32))])
+    arrays, job = make_job(file)
+    (bsdf,) = job["bsdfs"]
+    assert bsdf["opacity"] == {"type": "mesh_attribute", "name": "vertex_alpha"}
+    assert bsdf["content"]["type"] == "mask"
+    np.testing.assert_array_equal(arrays["alpha_of_0"], np.full((3, 1), 0.5))
+
+
+def test_texture_coordinates_are_the_set_that_textures_name() -> None:
+    sets = {f"TEXCOORD_{k}": np.full((3, 2), k, np.float32) for k in range(2)}
+    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}}}
+    material["occlusionTexture"] = {"index": 0}
+    assert Materials(File({"materials": [material]}, Path())).uv_set(0) == 1
+    transform = {"KHR_texture_transform": {"texCoord": 0}}
+    material["normalTexture"] = {"index": 0, "texCoord": 1, "extensions": transform}
+    with pytest.raises(ValueError, match="several sets"):
+        Materials(File({"materials": [material]}, Path())).uv_set(0)
+    arrays, _ = make_job(File({"materials": [{}]}, Path(), [triangle(**sets)]))
+    np.testing.assert_array_equal(arrays["uvs_0"], np.zeros((3, 2)))
+
+
+def test_normals_without_length_are_those_of_the_triangles() -> None:
+    """The format forbids them, and Mitsuba renders them black."""
+    normals = np.array([[0, 0, 0], [0, 0, 0], [0, 3, 4]], np.float32)
+    attributes = triangle().attributes
+    completed = _complete_normals(normals, attributes, np.uint32([[0, 1, 2]]))
+    np.testing.assert_allclose(completed, [[0, 0, 1], [0, 0, 1], [0, 0.6, 0.8]])

@@ -16,6 +16,7 @@ from relume.brdf.roughness_levels import (
     uses_roughness_map,
 )
 from relume.brdf.term_validation import complete_term
+from relume.brdf.terms import ggx
 from relume.core.errors import ParameterError
 
 WIDE = [term for term in TERMS.values() if term.width is not None and term.model != "ggx_multiple"]  # no highlight
@@ -64,6 +65,42 @@ def test_facets_are_convolved_with_the_slopes_of_normals() -> None:
         slopes = alpha**2 / (np.pi * (alpha**2 + squared) ** 2)
         expected = (slopes * gauss).sum() / gauss.sum() / np.cos(angle) ** 4
         assert value == pytest.approx(expected, rel=5e-3)
+
+
+def shown_by_normals(wi, wo, params, sigma, normals=4000):
+    """BRDF times cosine of a flat surface, the mean over normals of its map. (n,)"""
+    h = wi + wo
+    h /= np.linalg.norm(h, axis=1, keepdims=True)
+    theta_d, total = np.arccos(h @ wo), np.zeros(len(wi))
+    for slopes in np.random.default_rng(4).normal(size=(normals, 2)) * sigma:
+        n = np.array([*slopes, 1.0])
+        n /= np.linalg.norm(n)
+        if n @ wo < 0.01:  # bent into view
+            n += (0.01 - n @ wo) * wo
+            n /= np.linalg.norm(n)
+        cos_i, cos_h = np.maximum(wi @ n, 0), np.clip(h @ n, 0, 1)
+        facets = ggx.ndf(np.arccos(cos_h), params) * ggx.reflectance(theta_d, params)
+        masked = ggx.masking(np.arccos(cos_i), params) * ggx.masking(np.arccos(n @ wo), params)
+        total += np.where(cos_i > 0, facets * masked / (4 * (n @ wo)), 0)
+    return total / normals
+
+
+@pytest.mark.parametrize(("degrees", "max_error"), [(40, 0.05), (60, 0.06), (78, 0.1)])
+def test_normals_within_a_pixel_do_not_face_the_viewer(degrees, max_error) -> None:
+    """Facets would, and be too bright where they reflect what is above, too dark at the horizon."""
+    params, sigma, num = {"roughness": 0.34, "f0": 0.04}, 0.077, 120
+    wo = np.array([np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))])
+    z, phi = np.meshgrid((np.arange(num) + 0.5) / num, 2 * np.pi * (np.arange(num) + 0.5) / num, indexing="ij")
+    wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], axis=-1).reshape(-1, 3)
+    expected = shown_by_normals(wi, wo, params, sigma)
+    h = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    wide = {**params, "slope_variance": sigma**2}
+    masked = ggx.light_masking(np.arccos(wi[:, 2]), wide) * ggx.view_masking(np.radians(degrees), wide)
+    value = ggx.ndf(np.arccos(h[:, 2]), wide) * ggx.reflectance(np.arccos(h @ wo), wide) * masked / (4 * wo[2])
+    elevation = np.degrees(np.arcsin(wi[:, 2]))
+    bands = np.digitize(elevation, [15, 30, 50])
+    shown, summed = (np.bincount(bands, weights=brdf) for brdf in (value, expected))
+    assert np.abs(shown - summed).sum() < max_error * summed.sum()
 
 
 @pytest.mark.parametrize("model", ["ward", "cook_torrance", "blinn_phong"])

@@ -279,6 +279,14 @@ def test_incompatible_texture_transforms_give_a_warning(other) -> None:
     assert any("different UV transforms" in warning for warning in scene.warnings)
 
 
+@pytest.mark.parametrize("number", [0, 1])
+def test_sets_of_uvs_keep_their_numbers_if_the_first_is_missing(number: int) -> None:
+    glb, other = Glb(), np.full((4, 2), 0.25, np.float32)
+    info = {"index": glb.texture(np.zeros((1, 2, 3))), "texCoord": number}
+    glb.quad({"pbrMetallicRoughness": {"baseColorTexture": info}}, TEXCOORD_0=None, TEXCOORD_1=other)
+    np.testing.assert_array_equal(imported(glb).meshes[0].uvs, other * number)
+
+
 def test_the_second_uv_set_is_used_if_referenced() -> None:
     glb = Glb()
     info = {"index": glb.texture([[[1, 2, 3]]]), "texCoord": 1}

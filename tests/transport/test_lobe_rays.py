@@ -20,13 +20,14 @@ from relume.brdf.term_validation import complete_term
 from relume.lights.sphere_tiles import choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
+from relume.math.zernike import basis_functions
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.raytrace.tangents import any_tangent
 from relume.transport.hit_textures import textured_light
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
 from relume.transport.lobe_paths import END, NO_EMITTER, NO_SURFACES, LobePaths, no_paths
 from relume.transport.lobe_rays import NO_EMISSION, NO_ENVIRONMENT, NO_PEAKS, LobeRays
-from relume.transport.outgoing_patch_light import isotropic, no_light
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, isotropic, no_light, radiance_from_patch
 from relume.transport.shading.shader import Shader
 from relume.transport.shading_points import build_ray_lists
 from relume.transport.term_contraction import contract
@@ -238,6 +239,46 @@ def test_rays_bring_the_light_of_a_patch_times_the_texture_by_its_mean():
     plain = listed(untextured(isotropic(light)))
     textured = listed(textured_light(light, unit_share, mean, np.array([0, 1])))
     np.testing.assert_allclose(textured, plain * factor[:, None], rtol=0.01)
+
+
+@pytest.mark.parametrize("specular_share", [0.0, 0.4])
+def test_rings_are_no_darker_than_the_light_they_belong_to(specular_share):
+    """A gold rim on porcelain: the texture is twelve times the patch's mean, and directional light rings."""
+    chrome, (normal, wo) = document("ggx", roughness=0.1, f0=1.0), view(40)
+    pattern = make_lobe_pattern(sample_lobe(chrome, NO_LEVELS), 55, 3)
+    light = np.zeros((65_536, 3), np.float32)
+    light[7:9] = 1
+    bright = 5 * basis_functions(np.array([[0.0, 0, 1]]))[:, None, :NUM_OUTGOING]
+    ringing = np.repeat(np.concatenate([bright, -bright]), 3, axis=1).astype(np.float32)
+    # rays leave along the mirror direction, which the patches see along their normals
+    along = wo[:1] - 2 * (wo[:1] * normal[:1]).sum() * normal[:1]
+    across = any_tangent(along)
+    frame = np.repeat(np.stack([across, np.cross(along, across)], axis=1), 2, axis=0).astype(np.float32)
+    outgoing = radiance_from_patch(light, np.array([7, 8]), frame, ringing)
+    mean, unit_share = np.ones((2, 65_536, 3), np.float32), np.zeros((2, 65_536, 3), np.float32)
+    mean[1, 7:9], unit_share[1, 7:9] = 0.25, specular_share / 0.25
+    hits = LobeHits(
+        np.tile(np.uint16([7, 8]), (NUM_POINTS, 28))[:, :55], np.zeros((NUM_POINTS, 7), np.uint8),
+        np.full((1, NUM_POINTS, 55), rgb9e5_pack(np.float32([3, 3, 3])), np.uint32), no_paths(NUM_POINTS, 1),
+    )  # fmt: skip
+    points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))
+
+    def listed(outgoing, unit_share):
+        textured = textured_light(light, unit_share, mean, np.array([1]))
+        rays = LobeRays(
+            hits, pattern, outgoing, textured, NO_ENVIRONMENT, NO_SHARE, NO_FOOTPRINT, NO_SURFACES, NO_PEAKS,
+            NO_EMISSION,
+        )  # fmt: skip
+        lists = build_ray_lists(rays, points, 0, NUM_POINTS)
+        return lists.irradiance[:, : int(lists.first[-1])].copy()
+
+    weight = listed(isotropic(light), 0 * unit_share)
+    radiance = listed(outgoing, unit_share) / weight
+    even = 1 - specular_share  # light without the texture
+    least = even if specular_share else 0
+    bright, dark = radiance.max(axis=1), radiance.min(axis=1)
+    np.testing.assert_allclose(dark, least, atol=1e-4)
+    assert np.all(bright > 10)
 
 
 def test_polished_surfaces_reflect_lights_with_their_images():

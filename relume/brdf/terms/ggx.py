@@ -65,14 +65,32 @@ def _convolved(alpha2: float, added: float, sin2: F64, cos2: F64) -> F64:
     return np.asarray(total / np.square(cos2))
 
 
-def masking(theta: F64, params: Params) -> F64:
-    """G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; written without the tangent, which has a pole.
-
-    Normals that vary mask one another like facets: α² + 2 σ² with their "slope_variance" σ².
-    """
-    alpha2 = roughness_to_alpha(params["roughness"]) ** 2 + 2 * params.get("slope_variance", 0.0)
+def masking(theta: F64, params: Params, power: float = 0.0) -> F64:
+    """G1 cos^p θ, G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; without the tangent, which has a pole."""
+    alpha2 = roughness_to_alpha(params["roughness"]) ** 2
     cos = np.cos(theta)
-    return np.asarray(2.0 * cos / (cos + np.sqrt(cos * cos + alpha2 * np.sin(theta) ** 2)))
+    return np.asarray(2.0 * cos ** (1 + power) / (cos + np.sqrt(cos * cos + alpha2 * np.sin(theta) ** 2)))
+
+
+def light_masking(theta_i: F64, params: Params) -> F64:
+    """G1(wi) / cos^(w/2) θi, see `_share_of_normals`."""
+    return masking(theta_i, params, -_share_of_normals(params) / 2)
+
+
+def view_masking(theta_o: F64, params: Params) -> F64:
+    """G1(wo) cos^(w/2) θo, see `_share_of_normals`."""
+    return masking(theta_o, params, _share_of_normals(params) / 2)
+
+
+def _share_of_normals(params: Params) -> float:
+    """Share w = 2 σ² / (α² + 2 σ²) of the normals within a pixel in the slope of a half vector.
+
+    These normals n are on a surface that stays flat: all are seen alike, and none hides another. The mean over them has
+    1/(4 n·wo) where facets of that slope would have 1/(4 cos θo). If normals alone vary they are the half vectors, and
+    n·wo = cos θd; in general n·wo ≈ cos^(1−w) θo cos^w θd, with cos² θd ≈ cos θi cos θo beside the mirror direction.
+    """
+    variance = 2 * params.get("slope_variance", 0.0)
+    return float(variance / (roughness_to_alpha(params["roughness"]) ** 2 + variance))
 
 
 def reflectance(theta_d: F64, params: Params) -> F64:
@@ -90,8 +108,8 @@ GGX = Term(
     curves=(
         Curve("theta_h", "half angle θh", Angle.THETA_H, ndf, ("roughness",), 256),
         Curve("theta_d", "difference angle θd", Angle.THETA_D, reflectance, ("f0",), 64),
-        Curve("theta_i", "light masking θi", Angle.THETA_I, masking, ("roughness",), 64),
-        Curve("theta_o", "view masking θo", Angle.THETA_O, masking, ("roughness",), 64),
+        Curve("theta_i", "light masking θi", Angle.THETA_I, light_masking, ("roughness",), 64),
+        Curve("theta_o", "view masking θo", Angle.THETA_O, view_masking, ("roughness",), 64),
     ),
     quotient=quotient,
     source="Walter 2007, eqs. 20, 33, 34: f = D F G1(wi) G1(wo) / (4 (n·wi)(n·wo))",

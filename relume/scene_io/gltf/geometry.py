@@ -38,6 +38,10 @@ class GltfGeometry:
     faces: Shaped[U32, "triangles 3"]
     colors: Shaped[F32, "vertices 4"] | None = None
 
+    def colors_or_white(self) -> Shaped[F32, "vertices 4"]:
+        """Colors of vertices; white if there are none."""
+        return np.ones((len(self.positions), 4), np.float32) if self.colors is None else self.colors
+
     def split_vertices(self, uvs: Shaped[F32, "triangles 3 2"]) -> GltfGeometry:
         """Return a copy with separate vertices for each triangle and new UV coordinates."""
         order = self.faces.reshape(-1)
@@ -110,7 +114,7 @@ def _read_attributes(
         return values[used_vertices]
 
     normals, tangents = attribute("NORMAL", 3), attribute("TANGENT", 4)
-    uvs = tuple(uv for uv in (attribute("TEXCOORD_0", 2), attribute("TEXCOORD_1", 2)) if uv is not None)
+    uvs = _uv_sets(attribute("TEXCOORD_0", 2), attribute("TEXCOORD_1", 2))
     colors = attribute("COLOR_0", 3, 4)
     if colors is not None:
         opaque = np.ones((len(colors), 4 - colors.shape[1]), np.float32)
@@ -127,6 +131,13 @@ def _read_attributes(
         normals = np.where(is_missing[:, None], _smooth_normals(points, faces), normals)
     tangents = np.zeros((len(points), 4), np.float32) if tangents is None else tangents
     return GltfGeometry(points, normals, tangents, uvs, faces.astype(np.uint32), colors)
+
+
+def _uv_sets(first: F32 | None, second: F32 | None) -> tuple[F32, ...]:
+    """Sets of UV coordinates by their number in the file; a missing first set is zero if there is a second."""
+    if second is None:
+        return () if first is None else (first,)
+    return (np.zeros_like(second) if first is None else first), second
 
 
 def _unroll(corners: NDArray[Any], mode: int) -> I64:

@@ -17,9 +17,10 @@ from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import F32, Camera, Mesh, Scene
+from relume.scene.textured_vertex_colors import TexturedColors, draw_textured_colors
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
-from relume.scene.vertex_colors import MAX_COLORED, draw_color_image, is_uniform
+from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.cameras import framing_camera, make_slug, rigid_frame
 from relume.scene_io.gltf.container import SUPPORTED_EXTENSIONS, GltfContainer, read_container
@@ -36,7 +37,7 @@ from relume.scene_io.gltf.geometry import MAX_COORDINATE, GltfGeometry, count_co
 from relume.scene_io.gltf.images import ImageReader
 from relume.scene_io.gltf.instances import read_instances
 from relume.scene_io.gltf.lights import LightReader
-from relume.scene_io.gltf.materials import WHITE, MaterialReader, ReadMaterial, VertexColors, has_textures
+from relume.scene_io.gltf.materials import WHITE, MaterialReader, ReadMaterial, TextureLayout, VertexColors
 from relume.scene_io.gltf.nodes import walk_nodes
 from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
@@ -210,14 +211,38 @@ class _SceneBuilder:
         if is_uniform(colors):
             return VertexColors((red, green, blue, alpha))
         num_triangles = sum(len(geometries[key].faces) for key in vertex_colors)
-        if has_textures(material) or num_triangles > MAX_COLORED:
-            reason = "it has textures" if has_textures(material) else f"it has more than {MAX_COLORED:,} triangles"
-            message = f"Vertex colors of material {quote(material.name)} were replaced by their average: {reason}."
-            self.warnings.append(approximated(message))
-            return VertexColors((red, green, blue, alpha))
-        return VertexColors(image=self._draw_color_image(geometries))
+        layout, reason = self._material_reader.texture_layout(material), f"it has more than {MAX_COLORED:,} triangles"
+        if num_triangles <= MAX_COLORED:
+            if layout is None:
+                return VertexColors(textured=self._draw_color_image(geometries))
+            # variants replace images, and would not know of the colors
+            textured = None if choices else self._draw_textured_colors(geometries, layout)
+            if textured is not None:
+                return VertexColors(textured=textured)
+            reason = "it has variants" if choices else "its textures would have too many texels"
+        message = f"Vertex colors of material {quote(material.name)} were replaced by their average: {reason}."
+        self.warnings.append(approximated(message))
+        return VertexColors((red, green, blue, alpha))
 
-    def _draw_color_image(self, geometries: dict[Key, GltfGeometry]) -> NDArray[np.uint8]:
+    def _draw_textured_colors(
+        self, geometries: dict[Key, GltfGeometry], layout: TextureLayout
+    ) -> TexturedColors | None:
+        """Draw the vertex colors of geometries for a material with textures; they may get other UV coordinates."""
+        uvs = {key: layout.slot.apply(g.uvs, len(g.positions)) for key, g in geometries.items()}
+        colors = {key: g.colors_or_white() for key, g in geometries.items()}
+        corners = [np.concatenate([values[key][g.faces] for key, g in geometries.items()]) for values in (uvs, colors)]
+        textured = draw_textured_colors(corners[0], corners[1], layout.size, layout.wrap)
+        if textured is None or textured.corner_uvs is None:
+            return textured
+        blocks = np.split(textured.corner_uvs, np.cumsum([len(g.faces) for g in geometries.values()])[:-1])
+        for (key, geometry), block in zip(geometries.items(), blocks, strict=True):
+            if not geometry.tangents.any():  # along the textures, not along the blocks
+                tangents = compute_tangents(geometry.positions, geometry.normals, uvs[key], geometry.faces)
+                geometry = replace(geometry, tangents=tangents)
+            self._geometry[key] = geometry.split_vertices(block)
+        return textured
+
+    def _draw_color_image(self, geometries: dict[Key, GltfGeometry]) -> TexturedColors:
         """Draw the vertex colors of geometries, and set their UV coordinates in the image."""
         colors_by_key = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
         corners = [colors[geometries[key].faces] for key, colors in colors_by_key.items()]
@@ -229,7 +254,7 @@ class _SceneBuilder:
         for key in geometries.keys() - colors_by_key.keys():
             white_uvs = np.tile(white_uv, (len(geometries[key].positions), 1))
             self._geometry[key] = replace(geometries[key], uvs=(white_uvs,))
-        return image
+        return TexturedColors(image, WRAP)
 
     def _read_material(self, index: int | None, colors: VertexColors = WHITE) -> ReadMaterial:
         return self._material_reader.read(self._gltf_material(index), colors)

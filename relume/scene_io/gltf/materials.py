@@ -8,10 +8,9 @@ appendix B, and the specifications of the extensions.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -19,9 +18,9 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 from relume.scene.texture_encoding import mean_value
+from relume.scene.textured_vertex_colors import TexturedColors
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_IOR
-from relume.scene.vertex_colors import WRAP
 from relume.scene_io.gltf.blend import MetallicBlend, lerp
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import TextureInfo
@@ -40,11 +39,19 @@ class VertexColors:
 
     Attributes:
         factor: RGB and alpha that multiply the base color.
-        image: replaces the base color texture; None if there is a texture, or the colors are uniform.
+        textured: multiplies the base color texture, if there is one; None if the colors are uniform.
     """
 
     factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    image: Shaped[NDArray[np.uint8], "height width 4"] | None = None
+    textured: TexturedColors | None = None
+
+
+class TextureLayout(NamedTuple):
+    """Texture coordinates of a material: their slot, height and width of its largest image, and its wrap modes."""
+
+    slot: UvSlot
+    size: tuple[int, int]
+    wrap: tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -74,6 +81,7 @@ class MaterialReader:
         self._names: dict[str, int] = {}
         self._remaining_texels = MAX_TEXTURE_TEXELS
         self._occluded_materials: list[str] = []
+        self._colors: TexturedColors | None = None  # of the material that is read
 
     def read(self, material: GltfMaterial, colors: VertexColors = WHITE) -> ReadMaterial:
         """Convert one material, with a unique name.
@@ -89,8 +97,9 @@ class MaterialReader:
         self._warn_unsupported(material, label)
         infos = [info for info in _infos(material, extensions) if info is not None]
         self._uv_transforms = UvTransforms(infos, label, self._warnings)
+        self._colors = colors.textured
         material = _scale_base_color(material, colors.factor)
-        surface = self._surface(material, extensions, self._raster(material, extensions, colors.image, label))
+        surface = self._surface(material, extensions, self._raster(material, extensions, label))
         strength, tangent_rotation = self._anisotropy(extensions, label)
         transmission = self._transmission(extensions, label)
         glass = self._glass(surface, extensions, transmission, label) if transmission > 0 else None
@@ -111,13 +120,26 @@ class MaterialReader:
             surface.textures | emission_textures,
             normal_map,
             material.doubleSided,
-            opacity=self._opacity(material, colors.image, label),
+            opacity=self._opacity(material, label),
             glass=glass,
         )
         anisotropy_rotation = tangent_rotation if strength > 0 else None
-        return ReadMaterial(
-            scene_material, self._uv_transforms.slot, anisotropy_rotation, self._emission(material, extensions, label)
-        )
+        has_own_uvs = self._colors is not None and self._colors.corner_uvs is not None
+        slot = UvSlot() if has_own_uvs else self._uv_transforms.slot
+        return ReadMaterial(scene_material, slot, anisotropy_rotation, self._emission(material, extensions, label))
+
+    def texture_layout(self, material: GltfMaterial) -> TextureLayout | None:
+        """Find where the textures of a material are; None if it has none that are used as images."""
+        label = f"material {quote(material.name or 'material')}"
+        extensions = read_extensions(material.extensions, label, [])
+        infos = [info for info in _infos(material, extensions) if info is not None]
+        if not infos:
+            return None
+        transforms = UvTransforms(infos, label, [])
+        loaded = [(info, *self._images.texture(info.index, f"a texture of {label}")) for info in infos]
+        shapes = [transforms.tile_image(info, pixels, wrap).shape for info, pixels, wrap in loaded]
+        size = max(height for height, *_ in shapes), max(width for _, width, *_ in shapes)
+        return TextureLayout(transforms.slot, size, loaded[0][2])
 
     def _transmission(self, extensions: MaterialExtensions, label: str) -> float:
         transmission = extensions.transmission
@@ -156,7 +178,7 @@ class MaterialReader:
             message = f"Unusual index of refraction {ior:g} on {label} (default 1.5): non-metallic parts reflect"
             self._warnings.append(unsupported(f"{message} {reflectance:.0%} of the light at normal incidence."))
 
-    def _opacity(self, material: GltfMaterial, colors: NDArray[np.uint8] | None, label: str) -> Opacity | None:
+    def _opacity(self, material: GltfMaterial, label: str) -> Opacity | None:
         """Opacity of a material; alpha is ignored in other alpha modes."""
         if material.alphaMode not in ("MASK", "BLEND"):
             if material.alphaMode != "OPAQUE":
@@ -164,11 +186,8 @@ class MaterialReader:
                 self._warnings.append(unsupported(message))
             return None
         pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
-        if pbr.baseColorTexture is not None:
-            pixels, wrap = self._load_image(pbr.baseColorTexture, f"the base color texture of {label}")
-            alpha = pixels[..., 3]
-        elif colors is not None:
-            alpha, wrap = colors[..., 3], WRAP
+        if (base := self._base_image(material, label)) is not None:
+            alpha, wrap = base[0][..., 3], base[1]
         cutoff = material.alphaCutoff if material.alphaMode == "MASK" else None
         return make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff, label, self._warnings)
 
@@ -214,26 +233,31 @@ class MaterialReader:
         textures["specular"] = self._count_texels(blend.normalized_f0(mean_f0, highest))
         return PbrSurface(factor, mean_f0, f90, roughness, specular_reflectance, textures)
 
-    def _raster(
-        self, material: GltfMaterial, extensions: MaterialExtensions, colors: NDArray[np.uint8] | None, label: str
-    ) -> Raster:
+    def _base_image(self, material: GltfMaterial, label: str) -> tuple[NDArray[np.uint8], tuple[str, str]] | None:
+        """The base color texture times vertex colors, with its wrap modes; None if both are uniform."""
+        info = material.pbrMetallicRoughness.baseColorTexture
+        image = None if info is None else self._load_image(info, f"the base color texture of {label}")
+        if self._colors is None:
+            return image
+        return self._colors.image if image is None else self._colors.multiply(image[0]), self._colors.wrap
+
+    def _raster(self, material: GltfMaterial, extensions: MaterialExtensions, label: str) -> Raster:
         """The textures of the base layer, resampled to the size of the first."""
-        if colors is not None:
-            return Raster({"base": (colors, WRAP)})
-        pbr = material.pbrMetallicRoughness
+        pbr, base = material.pbrMetallicRoughness, self._base_image(material, label)
         infos = {
-            "base": (pbr.baseColorTexture, "base color"),
             "packed": (pbr.metallicRoughnessTexture, "metallic-roughness"),
             "specular": (extensions.specular.specularTexture, "specular"),
             "tint": (extensions.specular.specularColorTexture, "specular color"),
         }
-        images = {
+        images = {} if base is None else {"base": base}
+        images |= {
             key: self._load_image(info, f"the {texture_name} texture of {label}")
             for key, (info, texture_name) in infos.items()
             if info is not None
         }
+        tiled = {key: info for key, (info, _) in infos.items()} | {"base": pbr.baseColorTexture}
         tiled_shapes = [
-            images[key][0].shape for key, (info, _) in infos.items() if info and self._uv_transforms.is_tiled(info)
+            images[key][0].shape for key, info in tiled.items() if info and self._uv_transforms.is_tiled(info)
         ]
         return Raster(
             images, (max((h for h, _, _ in tiled_shapes), default=0), max((w for _, w, _ in tiled_shapes), default=0))
@@ -287,7 +311,8 @@ class MaterialReader:
     def _load_image(self, info: TextureInfo, label: str) -> tuple[NDArray[np.uint8], tuple[str, str]]:
         """Load a texture, tiled for the UV coordinates of the meshes, with its wrap modes."""
         pixels, wrap = self._images.texture(info.index, label)
-        return self._uv_transforms.tile_image(info, pixels, wrap), wrap
+        pixels = self._uv_transforms.tile_image(info, pixels, wrap)
+        return (pixels, wrap) if self._colors is None else self._colors.place(pixels, wrap)
 
     def _mean(self, info: TextureInfo | None, channel: int, label: str) -> float:
         """Mean of one channel in [0, 1], with a warning if it varies; 1 without a texture."""
@@ -329,21 +354,6 @@ def _infos(material: GltfMaterial, extensions: MaterialExtensions) -> list[Textu
     pbr, specular = material.pbrMetallicRoughness, extensions.specular
     images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
     return [*images, specular.specularTexture, specular.specularColorTexture, material.emissiveTexture]
-
-
-def has_textures(material: GltfMaterial) -> bool:
-    """True if a material uses any texture."""
-    pbr = material.pbrMetallicRoughness
-    texture_infos = [
-        pbr.baseColorTexture,
-        pbr.metallicRoughnessTexture,
-        material.normalTexture,
-        material.emissiveTexture,
-    ]
-    extension_objects = (value for value in material.extensions.values() if isinstance(value, dict))
-    return any(info is not None for info in texture_infos) or any(
-        key.endswith("Texture") for extension in extension_objects for key in extension
-    )
 
 
 def _scale_base_color(material: GltfMaterial, factor: tuple[float, float, float, float]) -> GltfMaterial:

@@ -13,6 +13,8 @@ from relume.live.fixed_camera.picture import Picture
 from relume.live.opened.openers import open_transfer
 from relume.look import default_look, validate
 from relume.methods.registry import METHODS
+from relume.raytrace.shading_normals import mean_normal
+from relume.raytrace.texture import MipMap
 from relume.reference.image import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
 from relume.scene.roughness_levels import levels_of_material, slope_variance
@@ -82,6 +84,25 @@ def test_the_mean_normal_tells_the_variance_of_slopes():
     normals = np.concatenate([-slopes, np.ones((len(slopes), 1))], axis=1)
     length = np.linalg.norm((normals / np.linalg.norm(normals, axis=1, keepdims=True)).mean(axis=0))
     assert slope_variance(np.array([length], np.float32))[0] == pytest.approx(0.05**2, rel=0.02)
+
+
+@pytest.mark.parametrize("sides", [[[9, 2], [-0.5, 2]], [[1, 0], [2, 14]], [[6, 0], [0, 6]]])
+def test_means_are_over_the_pixel_however_long_it_is(sides):
+    """Against the mean of many lookups of single normals; a square as wide as the pixel is long has more variance."""
+    texture, num = bumps(), 24
+    uv = np.random.default_rng(5).random((200, 2)).astype(np.float32)
+    extent = np.tile(np.float32(sides) / 256, (200, 1, 1))
+    steps = (np.arange(num) + 0.5) / num - 0.5
+    offsets = (steps[:, None, None] * extent[0, 0] + steps[None, :, None] * extent[0, 1]).reshape(-1, 2)
+    found = MipMap(texture).sample(
+        (uv[:, None] + offsets).reshape(-1, 2).astype(np.float32), np.zeros(200 * num**2, np.float32)
+    )
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    expected = found.reshape(200, -1, 3).mean(axis=1)
+    mean, length = mean_normal(texture, uv, extent)
+    # bumps of a few texels: interpolation in a MIP level flattens them somewhat
+    assert np.abs(mean - expected).max() < 0.03
+    assert np.mean(1 - length) == pytest.approx(np.mean(1 - np.linalg.norm(expected, axis=1)), rel=0.15)
 
 
 def test_roughness_levels_cover_the_widening(scene):
