@@ -29,7 +29,7 @@ F32 = NDArray[np.float32]
 _REACH = 3  # pixels across, within which the contrast is found
 _LEAST_CONTRAST = 3.0  # by the mean radiance
 _SIDES = 8, 4  # points along each side of a pixel: with the strongest contrast, and with others
-_MAX_STRONG, _MAX_WEAK = 768, 1024  # samples: 65,536 points
+_MAX_STRONG, _MAX_WEAK = 1024, 3072  # samples: 114,688 points
 
 
 class PixelPoints(NamedTuple):
