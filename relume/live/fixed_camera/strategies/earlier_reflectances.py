@@ -127,7 +127,7 @@ def _more_rays(target: TermTarget, patch_light: Illumination) -> Job:
     light, ready, lobe, term, bands = live.light, live.ready, live.lobe, live.term, live.target_bands
 
     def run(progress: ProgressCallback, is_canceled: CancelCheck) -> ShadedTerm:
-        light_args = light, is_canceled, LightQuality.PREVIEW, lobe, patch_light
+        light_args = light, is_canceled, LightQuality.EXACT, lobe, patch_light
         incident = images.incident_light(material, *light_args)
         return shade(term, bands, *incident, progress, is_canceled)
 
