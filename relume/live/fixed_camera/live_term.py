@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.lobe_sampling import LobeSampling, lobe_curves, sample_lobe
+from relume.brdf.lobe_sampling import LobeSampling, lobe_curves, lobe_of, sample_lobe
 from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.specular import specular_albedo
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -96,7 +96,9 @@ class LiveTerm:
     def lobe(self) -> LobeSampling | None:
         """The lobe along which rays are traced in the newest look; None if it is wide."""
         if self._lobe_document is not self.document:
-            self._lobe_document, self._lobe = self.document, sample_lobe(self.document, self.levels)
+            has_levels = bool(self.levels.pairs)
+            self._lobe = sample_lobe(self.document, self.levels) if has_levels else lobe_of(self.document)
+            self._lobe_document = self.document
         return self._lobe
 
     def lobe_beside(self, basis: EditBasis) -> LobeSampling | None:

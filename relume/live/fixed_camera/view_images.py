@@ -37,6 +37,7 @@ from relume.live.fixed_camera.protocols import (
     FixedViewTransfer,
     LightQuality,
     LightsAndPoints,
+    LobeShader,
     PatchRadiance,
 )
 from relume.look import Look, TermLook, validate
@@ -85,6 +86,7 @@ class ViewImages:
         gain: gain of the finished image. mirrors: the mirrors of the image.
         region: visible pixels of the image: x, y, width, height; None: all.
         outgoing_change: of the last incremental update, for the next term.
+        lobe_shader: of the last light that it was prepared for; None before.
     """
 
     def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
@@ -100,6 +102,7 @@ class ViewImages:
         self.mirrors = MirrorFactors(self.view)
         self.region: Tile | None = None
         self.outgoing_change: OutgoingChange | None = None
+        self.lobe_shader: LobeShader | None = None
 
     def view_with_overrides(self, look: Look) -> ViewImages:
         """Return the images of the view with the roughness- and normal-map overrides of a look; self if they are

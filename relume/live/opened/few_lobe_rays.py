@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from jaxtyping import Shaped
@@ -44,43 +43,32 @@ class LobeSource(EnvironmentSource, Protocol):
 
 @dataclass(frozen=True)
 class FewLobeRays:
-    """Shades narrow terms of an opened bake by few rays a sample. See `relume.live.free_camera.lobe_radiance`."""
+    """Shades narrow terms of an opened bake by few rays a sample. See `relume.live.free_camera.lobe_radiance`.
+
+    Attributes:
+        light_transport: the bake. light: the illumination. outgoing: of patches in that light.
+        environment: behind the scene.
+    """
 
     light_transport: LobeSource
+    light: Illumination
+    outgoing: OutgoingLight
+    environment: PrefilteredEnvironment
 
-    @cached_property
-    def _environments(self) -> PrefilteredEnvironments:
-        return PrefilteredEnvironments(self.light_transport)
+    @classmethod
+    def prepare(cls, light_transport: LobeSource, light: Illumination, is_canceled: CancelCheck) -> Self:
+        """Compute all that takes longer than a frame.
 
-    def _outgoing(self, light: Illumination, is_canceled: CancelCheck = lambda: False) -> OutgoingLight:
-        """Return the outgoing light of patches, cached. light: the illumination. is_canceled: polled"""
-        transport = self.light_transport
-        return transport.cache.transient.get_value(
-            self._outgoing_key(light), lambda: transport.lobe_scene(light, is_canceled).outgoing
-        )
-
-    def _outgoing_key(self, light: Illumination) -> tuple[Hashable, ...]:
-        return self.light_transport.key, "patch light of lobe rays", light
-
-    def environment(self, light: Illumination) -> PrefilteredEnvironment:
-        """Return the environment behind a scene, cached. light: the illumination"""
-        environment = light.environment
-        lookup, bright_lights = (
-            self._environments.environment_lookup(environment.map),
-            self._environments.bright_lights(environment),
-        )
+        Args:
+            light_transport: the bake. light: the illumination. is_canceled: polled.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
+        environments, key = PrefilteredEnvironments(light_transport), light.environment
+        lookup, bright_lights = environments.environment_lookup(key.map), environments.bright_lights(key)
         gain = np.array(light.environment_gain, np.float32)
-        return PrefilteredEnvironment(lookup, bright_lights, rotation_of(environment.rotation), gain)
-
-    def is_prepared(self, light: Illumination) -> bool:
-        """Return whether `shade` has all that takes longer than a frame. light: the illumination"""
-        has_environment = self._environments.has_environment_lookup(light.environment.map)
-        return has_environment and self.light_transport.cache.transient.contains(self._outgoing_key(light))
-
-    def prepare(self, light: Illumination, is_canceled: CancelCheck) -> None:
-        """Cache all that `shade` needs besides rays. light: the illumination. is_canceled: polled"""
-        self.environment(light)
-        self._outgoing(light, is_canceled)
+        environment = PrefilteredEnvironment(lookup, bright_lights, rotation_of(key.rotation), gain)
+        return cls(light_transport, light, light_transport.lobe_scene(light, is_canceled).outgoing, environment)
 
     def shade(
         self,
@@ -89,7 +77,6 @@ class FewLobeRays:
         view: View,
         material: int,
         light: Illumination,
-        patch_light: Illumination,
         document: Mapping[str, Any],
     ) -> Shaped[F32, "n 3"] | None:
         """Return the radiance of samples for a white term; None if its lobe is wide. See `LobeShader`."""
@@ -98,8 +85,8 @@ class FewLobeRays:
             return None
         image = self._image_points(view, material)
         footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
-        scene = self.light_transport.lobe_scene(light, lambda: False, self._outgoing(patch_light))
-        light_args = scene, self.environment(light), receivers, footprint
+        scene = self.light_transport.lobe_scene(light, lambda: False, self.outgoing)
+        light_args = scene, self.environment, receivers, footprint
         rays_per_point = MAX_RAYS / max(int(np.count_nonzero(image.is_first)), 1)
         ray_args = traced, image, rays_per_point, local_rays
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)

@@ -275,10 +275,9 @@ class BakedFixedViews:
         light_args = scene.outgoing, scene.textured, environment, scene.broad_share
         return LobeRays(hits, pattern, *light_args, footprint, scene.surfaces, peaks, scene.emission)
 
-    @cached_property
-    def few_lobe_rays(self) -> FewLobeRays:
-        """Images of narrow terms by few rays a sample."""
-        return FewLobeRays(self)
+    def few_lobe_rays(self, light: Illumination, is_canceled: Callable[[], bool]) -> FewLobeRays:
+        """Prepare images of narrow terms by few rays a sample. See `FixedViewTransfer`."""
+        return FewLobeRays.prepare(self, light, is_canceled)
 
     def lobe_scene(
         self,

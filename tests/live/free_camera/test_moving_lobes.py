@@ -8,7 +8,9 @@ from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
 from relume.brdf.albedo import directional_albedo
 from relume.core.cache import Cache
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.lobe_terms import split_terms
+from relume.live.free_camera.static_view_jobs import StaticViewState, residual_job
 from relume.live.opened.openers import open_bake
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import complete, validate
@@ -94,6 +96,38 @@ def test_direct_light_alone_leaves_the_floor_out(white):
     look = look_with(bake, lambda document: document["transport"].update(show="direct"))
     moving, exact, is_ball = show(bake, look), show(bake, look, builder), ball_of(bake, look)
     assert np.sqrt(np.mean((moving - exact)[is_ball] ** 2)) < 0.1 * np.sqrt(np.mean(exact[is_ball] ** 2))
+
+
+@pytest.mark.parametrize("roughness", [0.05, 0.1])  # partly a mirror of the exact image, and a lobe alone
+def test_the_residual_leaves_indirect_light_in_a_polished_surface(white, roughness):
+    bake, builder = white
+    size = 20 * SIZE[0], 20 * SIZE[1]
+    picture = FreeCameraPicture(bake, "front", is_watched=True)
+    picture.set_camera(CAMERA, size)
+
+    def edit(document):
+        document["materials"]["Ball"]["terms"][0]["params"]["roughness"] = roughness
+
+    look = look_with(bake, edit)
+    picture.set_look(look)
+    picture.advance(None)
+    while (job := picture.next_job()) is not None and job.key[0] != "highlights":
+        job.apply(job.run(lambda share: None, lambda: False))
+        picture.advance(None)
+    before = picture.image()
+    view_state = StaticViewState(builder.make_static_view, bake.cache, (CAMERA, size), look, None)
+    applied = []
+    job = residual_job(view_state, copy.copy(picture), (0, 0), applied.append)
+    job.apply(job.run(lambda share: None, lambda: False))
+    is_chrome = picture.stored_scene.face_material[np.maximum(picture.gbuffer.hits.face, 0)] == 0
+    is_chrome &= picture.gbuffer.hits.face >= 0
+    pixels = before.reshape(-1, 3)[is_chrome[: size[0] * size[1]]]
+    residual = np.zeros_like(before) if applied[0] is None else applied[0]
+    assert abs(residual.reshape(-1, 3)[is_chrome[: size[0] * size[1]]]).mean() < 0.02 * pixels.mean()
+    # the picture itself keeps the light of the floor
+    picture.set_camera(CAMERA, size)
+    picture.advance(None)
+    np.testing.assert_allclose(picture.image(), before, rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize("roughness", [0.01, 0.05, 0.2])
