@@ -57,9 +57,9 @@ class GBuffer(NamedTuple):
             _NO_VECTORS),
         )  # fmt: skip
 
-    def pixel_of_ray(self, num_pixels: int) -> Shaped[NDArray[np.intp], " n"]:
+    def pixel_of_ray(self, num_pixels: int) -> Shaped[NDArray[np.int32], " n"]:
         """Return the pixel of each ray. num_pixels: number of pixels of the image"""
-        pixel = np.concatenate([np.arange(num_pixels), self.owner])
+        pixel = np.concatenate([np.arange(num_pixels, dtype=np.int32), self.owner])
         return np.concatenate([pixel, pixel[self.glass.ray]])
 
     def first_hit_row(self, pixel: int) -> int:

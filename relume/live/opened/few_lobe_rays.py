@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
@@ -16,9 +16,11 @@ from relume.live.fixed_camera.protocols import Samples
 from relume.live.free_camera.basis.outgoing_coefficients import cosines
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
 from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
+from relume.look.model import Rgb
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.shading_points import ShadingPoints
@@ -38,6 +40,10 @@ class LobeSource(EnvironmentSource, Protocol):
         Args:
             light: the illumination. is_canceled: polled. outgoing: light of the patches; None: that of `light`.
         """
+        ...
+
+    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
+        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
         ...
 
 
@@ -84,11 +90,10 @@ class FewLobeRays:
         if traced is None:
             return None
         image = self._image_points(view, material)
-        footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
+        footprint, emitters = samples.pixel_footprint(receivers), self.light_transport.lobe_emitters(light)
         scene = self.light_transport.lobe_scene(light, lambda: False, self.outgoing)
         light_args = scene, self.environment, receivers, footprint
-        rays_per_point = MAX_RAYS / max(int(np.count_nonzero(image.is_first)), 1)
-        ray_args = traced, image, rays_per_point, local_rays
+        ray_args = traced, image, MAX_RAYS / max(image.num_pixels, 1), emitters
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)
         cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo).clip(0, 1)
         albedo = [np.interp(-cosine, -cosines(), column) for column in traced.albedo[:, 0].T]
@@ -99,10 +104,8 @@ class FewLobeRays:
         transport = self.light_transport
 
         def compute() -> ImagePoints:
-            pixel = view.pixel[view.rows(material)]
-            is_first = np.zeros(len(pixel), np.bool_)
-            is_first[np.unique(pixel, return_index=True)[1]] = True
-            return ImagePoints(pixel, is_first, (view.width, view.height))
+            pixel = view.pixel[view.rows(material)].astype(np.int32)
+            return ImagePoints.from_pixels(pixel, (view.width, view.height))
 
         key = transport.key, *view.sample_key(material), "points of the image"
         return transport.cache.transient.get_value(key, compute)
