@@ -159,6 +159,17 @@ class LiveTerm:
             self.displayed, self.is_composed = image, False
         return image
 
+    def keeps_showing(self, reference: DisplayedImage) -> bool:
+        """Return whether the displayed image is a copy of a reference image, which shows the target's curves."""
+        displayed = self.displayed
+        is_copy = displayed.reference is reference and displayed.bands is reference.bands
+        is_copy &= displayed.fidelity == Fidelity.APPROXIMATE
+        return is_copy and not reference.changed_curves(self.target_bands)
+
+    def keep_image(self, light: Illumination) -> None:
+        """Show the displayed image in another light; it need not be composed again."""
+        self.ready = self.displayed = replace(self.displayed, light=light)
+
     def display_ready(self) -> None:
         """Display the newest image, if there is one."""
         if not self.ready.is_empty and self.displayed is not self.ready:

@@ -47,8 +47,9 @@ F32 = NDArray[np.float32]
 
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _PI = np.float32(math.pi)
-# normals of a pixel at which a small light is evaluated: most if their spread is larger than light and lobe
-_LEAST_JITTERS, _JITTERS_OF_EQUAL, _MOST_JITTERS = 8, np.float32(16), 64
+# normals of a pixel at which a small light is evaluated: most if their spread is larger than light and lobe, one if the
+# lobe is much wider than both
+_LEAST_JITTERS, _JITTERS_OF_EQUAL, _MOST_JITTERS = np.float32(8), np.float32(16), 64
 _MOST_COVERAGES = 16  # normals of a pixel at which the share of a triangle is evaluated
 _DIRECTION_SEED = np.uint32(0x27D4EB2F)
 _MOST_TRIANGLES, _LEAST_AREA = 128, 1e-12  # of an area light; m²
@@ -103,6 +104,20 @@ class LobeEmitter(NamedTuple):
         return cls(light, strata, *arrays, np.float32(radius))
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def mirror_direction(points, p, wo):  # type: ignore[no-untyped-def]
+    """Mirror direction of a point, a tuple."""
+    n, o = points.normal[p], wo[p]
+    twice = _TWO * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
+    return twice * n[0] - o[0], twice * n[1] - o[1], twice * n[2] - o[2]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def _is_within(r, d, reach):  # type: ignore[no-untyped-def]
+    """Return whether two directions may be within an angle, radians: their chord is shorter than the angle."""
+    return _TWO - _TWO * (r[0] * d[0] + r[1] * d[1] + r[2] * d[2]) < reach * reach
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def disk_radius(variance):  # type: ignore[no-untyped-def]
     """Radius of a disk of directions, radians. variance: 1 − R, with the length R of their mean"""
@@ -136,7 +151,7 @@ def _local(frame, d):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):  # type: ignore[no-untyped-def]
+def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius, spread):  # type: ignore[no-untyped-def]
     """Mean density p of a disk of directions over the part of a pixel that a point shows, per steradian.
 
     Whichever is wider, lobe or disk, is evaluated at directions from the other.
@@ -144,25 +159,19 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):
     Args:
         points, p: the point. wo: view directions. footprint: of each point, or one. pattern: `LobePattern`.
         widths: median and 99.9th percentile of the angles of ωi to the mirror direction, radians.
-        direction: center of the disk, a tuple. radius: radians.
+        direction: center of the disk, a tuple. radius: radians. spread: from `half_vector_spread`.
     """
-    normal, spread, seed = points.normal[p], half_vector_spread(footprint, p), points.seed[p]
-    part = footprint[min(p, footprint.shape[0] - 1)]
-    cosine = normal[0] * wo[p, 0] + normal[1] * wo[p, 1] + normal[2] * wo[p, 2]
-    mirrored = _ZERO
-    for axis in range(3):
-        mirrored += direction[axis] * (_TWO * cosine * normal[axis] - wo[p, axis])
-    if acos_clamped(mirrored) > radius + widths[1] + _TWO * spread:
-        return _ZERO
+    normal, seed, part = points.normal[p], points.seed[p], footprint[min(p, footprint.shape[0] - 1)]
     is_wide, ratio = widths[0] > radius, spread / max(widths[0], radius)
-    num = min(int(_LEAST_JITTERS + _JITTERS_OF_EQUAL * ratio * ratio), _MOST_JITTERS)
+    least = _ONE + _JITTERS_OF_EQUAL * (radius / widths[0]) ** 2 if is_wide else _LEAST_JITTERS
+    num = min(int(least + _JITTERS_OF_EQUAL * ratio * ratio), _MOST_JITTERS)
     d_t, d_b = tangents_of(direction)
     sin_radius, half_chord, total = np.float32(math.sin(radius)), np.float32(math.sin(_HALF * radius)), _ZERO
     chord_squared = np.float32(4) * half_chord * half_chord  # by π the solid angle: 2π (1 − cos ρ) = 4π sin² ρ/2
     for k in range(num):
-        u, v = ray_jitter(k, seed)
+        u, v = ray_jitter(k, seed) if num > 1 else (_HALF, _HALF)
         (t, b, n), o = jittered_frame(normal, points.tangent[p], wo[p], part, u - _HALF, v - _HALF)
-        r, azimuth = ray_jitter(k, np.uint32(seed) ^ _DIRECTION_SEED)
+        r, azimuth = ray_jitter(k, np.uint32(seed) ^ _DIRECTION_SEED) if num > 1 else (_ZERO, _ZERO)
         if is_wide:
             r, azimuth = sin_radius * np.float32(math.sqrt(r)), _TWO * _PI * azimuth
             x, y = r * np.float32(math.cos(azimuth)), r * np.float32(math.sin(azimuth))
@@ -187,17 +196,20 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):
 def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environment, start, stop, out):  # type: ignore[no-untyped-def]
     """Add the bright lights of the environment at points [start, stop). tracer: of shadows. out: added to. (n, 3)"""
     packet, lights = new_packet(tracer), environment.bright_lights
-    density = np.empty(LANES, np.float32)
-    for k in range(lights.shape[0]):
-        d, radius = (lights[k, 0], lights[k, 1], lights[k, 2]), disk_radius(lights[k, 6])
-        for first in range(start, stop, LANES):
-            width, num_lit = min(LANES, stop - first), 0
+    (density, spread), mirrored = np.empty((2, LANES), np.float32), np.empty((LANES, 3), np.float32)
+    for first in range(start, stop, LANES):
+        width = min(LANES, stop - first)
+        for lane in range(width):
+            mirrored[lane] = mirror_direction(points, first + lane, wo)
+            spread[lane] = half_vector_spread(footprint, first + lane)
+        for k in range(lights.shape[0]):
+            d, radius, num_lit = (lights[k, 0], lights[k, 1], lights[k, 2]), disk_radius(lights[k, 6]), 0
             for lane in range(LANES):
-                p = first + min(lane, width - 1)
-                position = points.position[p]
-                density[lane] = (
-                    _mean_density(points, p, wo, footprint, pattern, widths, d, radius) if lane < width else _ZERO
-                )
+                p, r = first + min(lane, width - 1), mirrored[min(lane, width - 1)]
+                position, reach = points.position[p], radius + widths[1] + _TWO * spread[min(lane, width - 1)]
+                density[lane] = 0
+                if lane < width and _is_within(r, d, reach):
+                    density[lane] = _mean_density(points, p, wo, footprint, pattern, widths, d, radius, spread[lane])
                 set_origin(packet, lane, position[0], position[1], position[2])
                 set_direction(packet, lane, d[0], d[1], d[2], np.float32(np.inf))
                 enable_lane(packet, lane, density[lane] > 0)
@@ -210,14 +222,6 @@ def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environme
                     for channel in range(3):
                         weight = density[lane] * environment.gain[channel]
                         out[first + lane, channel] += weight * lights[k, 3 + channel]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def mirror_direction(points, p, wo):  # type: ignore[no-untyped-def]
-    """Mirror direction of a point, a tuple."""
-    n, o = points.normal[p], wo[p]
-    twice = _TWO * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
-    return twice * n[0] - o[0], twice * n[1] - o[1], twice * n[2] - o[2]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -237,10 +241,11 @@ def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, ga
             dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
                 emitter.light, emitter.strata, 0, _ZERO, _ZERO, x, y, z
             )
-            irradiance[lane] = weight
-            if weight > 0:
-                irradiance[lane] *= _mean_density(
-                    points, p, wo, footprint, pattern, widths, (dx, dy, dz), _POINT_RADIUS
+            irradiance[lane], spread = 0, half_vector_spread(footprint, p)
+            reach = _POINT_RADIUS + widths[1] + _TWO * spread
+            if weight > 0 and _is_within(mirror_direction(points, p, wo), (dx, dy, dz), reach):
+                irradiance[lane] = weight * _mean_density(
+                    points, p, wo, footprint, pattern, widths, (dx, dy, dz), _POINT_RADIUS, spread
                 )
             along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, offset)
             set_origin(packet, lane, x, y, z)

@@ -40,7 +40,7 @@ _BLOCK = 16  # pixels along each side: the first point in each block has rays, s
 _LEAST_POINTS = 256  # with rays of their own
 _SHARED_PART = np.float32(0.5)  # of the squared widths of lobe and pixel
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
-_MAX_EXPONENT = np.float32(4)
+_SIXTEENTH = np.float32(1 / 16)
 _NEVER = np.float32(2)
 # least weight of a neighbor, where no other agrees, by its squared distance in pixels
 _LEAST_WEIGHTS = (1e-3 / (1 + np.arange(2 * _MAX_REACH**2 + 1) ** 3.0)).astype(np.float32)
@@ -119,8 +119,10 @@ def _weight(traced, position, n, r, q, sharpness):  # type: ignore[no-untyped-de
     if rise * rise > np.float32(0.25) * (dx * dx + dy * dy + dz * dz):
         return _ZERO
     dx, dy, dz = r[0] - s[0], r[1] - s[1], r[2] - s[2]
-    # near e^−x, with an end
-    weight = max(_ONE - sharpness * (dx * dx + dy * dy + dz * dz) / _MAX_EXPONENT, _ZERO)
+    # (1 − x/16)¹⁶ is near e^−x
+    weight = max(_ONE - _SIXTEENTH * sharpness * (dx * dx + dy * dy + dz * dz), _ZERO)
+    weight *= weight
+    weight *= weight
     weight *= weight
     return weight * weight
 

@@ -6,14 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
+import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.numba_options import NO_REFCOUNT
+from relume.core.thread_pools import parallel_for_chunks
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import Samples
-from relume.live.free_camera.basis.outgoing_coefficients import cosines
+from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.lobe_lights import LobeEmitter
@@ -95,9 +98,9 @@ class FewLobeRays:
         light_args = scene, self.environment, receivers, footprint
         ray_args = traced, image, MAX_RAYS / max(image.num_pixels, 1), emitters
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)
-        cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo).clip(0, 1)
-        albedo = [np.interp(-cosine, -cosines(), column) for column in traced.albedo[:, 0].T]
-        return np.asarray(np.stack(albedo, axis=1) * radiance, np.float32)
+        args = receivers.normal, receivers.wo, np.ascontiguousarray(traced.albedo[:, 0])
+        parallel_for_chunks(lambda start, stop: _scale_by_albedo(*args, start, stop, radiance), len(radiance))
+        return radiance
 
     def _image_points(self, view: View, material: int) -> ImagePoints:
         """Return the samples of a material as points of their image, cached."""
@@ -109,3 +112,14 @@ class FewLobeRays:
 
         key = transport.key, *view.sample_key(material), "points of the image"
         return transport.cache.transient.get_value(key, compute)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _scale_by_albedo(normal, wo, albedo, start, stop, radiance):  # type: ignore[no-untyped-def]
+    """Multiply L̄ of samples [start, stop) by the directional albedo, in place. albedo: over θo. (rows, 3)"""
+    for p in range(start, stop):
+        cosine = normal[p, 0] * wo[p, 0] + normal[p, 1] * wo[p, 1] + normal[p, 2] * wo[p, 2]
+        row, fraction = table_row(min(max(cosine, MIN_COSINE), np.float32(1)))
+        for channel in range(3):
+            lower, upper = albedo[row, channel], albedo[row + 1, channel]
+            radiance[p, channel] *= lower + fraction * (upper - lower)

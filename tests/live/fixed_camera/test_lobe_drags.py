@@ -97,6 +97,20 @@ def test_every_step_of_a_slow_drag_is_shown(polished, prepared):
     assert (images[1] != images[2]).any()
 
 
+def test_only_the_dragged_material_is_drawn_again(polished, prepared):
+    before, (ball, floor) = prepared.image(), masks(polished)
+    for roughness in (0.3, 0.2):
+        prepared.set_look(rough(polished, roughness), active_pointer=ROUGHNESS)
+        tiles = prepared.advance(None).tiles
+    is_drawn = np.zeros_like(ball)
+    for x, y, width, height in tiles:
+        is_drawn[y : y + height, x : x + width] = True
+    assert is_drawn[ball].all()
+    assert is_drawn.mean() < 0.75
+    np.testing.assert_array_equal(prepared.image()[floor], before[floor])
+    np.testing.assert_allclose(run_until_exact(prepared).image(), exact(polished, 0.2), rtol=1e-4, atol=1e-4)
+
+
 def test_a_dragged_reflectance_is_free_of_noise(polished):
     picture = Picture(polished, "front", Cache(BUDGET), is_watched=True)
     picture.set_look(rough(polished, 0.1))

@@ -63,6 +63,9 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
         image = _trace_lobe(target, light, shader)
         live.set_ready(replace(state, image=image, bands=live.target_bands, traces_lobe=True))
         return
+    if live.keeps_showing(reference):
+        live.keep_image(light)
+        return
     steps = images.operator(material, live, reference)
     if steps is not None:
         reference = live.mark_lobe(operator.advance(reference, live.target_bands, steps, None))
