@@ -113,9 +113,9 @@ def mirror_direction(points, p, wo):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _is_within(r, d, reach):  # type: ignore[no-untyped-def]
-    """Return whether two directions may be within an angle, radians: their chord is shorter than the angle."""
-    return _TWO - _TWO * (r[0] * d[0] + r[1] * d[1] + r[2] * d[2]) < reach * reach
+def _chord(r, d):  # type: ignore[no-untyped-def]
+    """Distance of two unit directions: hardly less than their angle if that is small, and never more."""
+    return np.float32(math.sqrt(max(_TWO - _TWO * (r[0] * d[0] + r[1] * d[1] + r[2] * d[2]), _ZERO)))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -151,7 +151,7 @@ def _local(frame, d):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius, spread):  # type: ignore[no-untyped-def]
+def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius, spread, chord):  # type: ignore[no-untyped-def]
     """Mean density p of a disk of directions over the part of a pixel that a point shows, per steradian.
 
     Whichever is wider, lobe or disk, is evaluated at directions from the other.
@@ -160,10 +160,13 @@ def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius, 
         points, p: the point. wo: view directions. footprint: of each point, or one. pattern: `LobePattern`.
         widths: median and 99.9th percentile of the angles of ωi to the mirror direction, radians.
         direction: center of the disk, a tuple. radius: radians. spread: from `half_vector_spread`.
+        chord: from the mirror direction of the point to that direction.
     """
     normal, seed, part = points.normal[p], points.seed[p], footprint[min(p, footprint.shape[0] - 1)]
-    is_wide, ratio = widths[0] > radius, spread / max(widths[0], radius)
-    least = _ONE + _JITTERS_OF_EQUAL * (radius / widths[0]) ** 2 if is_wide else _LEAST_JITTERS
+    # the density varies over its width, or over the distance of its peak where that is larger
+    scale = max(widths[0], chord - radius - _TWO * spread)
+    is_wide, ratio = scale > radius, spread / max(scale, radius)
+    least = _ONE + _JITTERS_OF_EQUAL * (radius / scale) ** 2 if is_wide else _LEAST_JITTERS
     num = min(int(least + _JITTERS_OF_EQUAL * ratio * ratio), _MOST_JITTERS)
     d_t, d_b = tangents_of(direction)
     sin_radius, half_chord, total = np.float32(math.sin(radius)), np.float32(math.sin(_HALF * radius)), _ZERO
@@ -207,9 +210,11 @@ def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environme
             for lane in range(LANES):
                 p, r = first + min(lane, width - 1), mirrored[min(lane, width - 1)]
                 position, reach = points.position[p], radius + widths[1] + _TWO * spread[min(lane, width - 1)]
-                density[lane] = 0
-                if lane < width and _is_within(r, d, reach):
-                    density[lane] = _mean_density(points, p, wo, footprint, pattern, widths, d, radius, spread[lane])
+                density[lane], chord = 0, _chord(r, d)
+                if lane < width and chord < reach:
+                    density[lane] = _mean_density(
+                        points, p, wo, footprint, pattern, widths, d, radius, spread[lane], chord
+                    )
                 set_origin(packet, lane, position[0], position[1], position[2])
                 set_direction(packet, lane, d[0], d[1], d[2], np.float32(np.inf))
                 enable_lane(packet, lane, density[lane] > 0)
@@ -242,10 +247,10 @@ def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, ga
                 emitter.light, emitter.strata, 0, _ZERO, _ZERO, x, y, z
             )
             irradiance[lane], spread = 0, half_vector_spread(footprint, p)
-            reach = _POINT_RADIUS + widths[1] + _TWO * spread
-            if weight > 0 and _is_within(mirror_direction(points, p, wo), (dx, dy, dz), reach):
+            chord = _chord(mirror_direction(points, p, wo), (dx, dy, dz))
+            if weight > 0 and chord < _POINT_RADIUS + widths[1] + _TWO * spread:
                 irradiance[lane] = weight * _mean_density(
-                    points, p, wo, footprint, pattern, widths, (dx, dy, dz), _POINT_RADIUS, spread
+                    points, p, wo, footprint, pattern, widths, (dx, dy, dz), _POINT_RADIUS, spread, chord
                 )
             along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, offset)
             set_origin(packet, lane, x, y, z)
