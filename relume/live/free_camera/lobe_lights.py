@@ -80,33 +80,43 @@ class LobeEmitter(NamedTuple):
         Args:
             light: the light. strata: its samples, from `relume.lights.local_lights.make_light_strata`.
         """
-        corner, edges = light.corner[:, None], light.edges
-        triangles = np.concatenate([corner, corner + edges], axis=1)
-        if light.is_rectangle:
-            opposite = corner + edges.sum(axis=1, keepdims=True)
-            triangles = np.concatenate(
-                [triangles, np.concatenate([opposite, triangles[:, 2:], triangles[:, 1:2]], axis=1)]
-            )
-        share = np.diff(light.power_cdf, prepend=0)
-        if len(share) > _MOST_TRIANGLES:
-            corners = make_emitter_parts(light, strata).corners[-len(strata.uv) :]
-            triangles = np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]])
-            share = np.full(len(corners), 1 / len(corners))
-        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        length = np.linalg.norm(normal, axis=1)
-        area = length.reshape(-1, len(share)).sum(axis=0) / 2 if len(share) else np.zeros(0)
-        radiance = np.tile(light.area * share / np.maximum(area, _LEAST_AREA), len(length) // max(len(share), 1))
+        power, triangles = _halves(light, strata)
+        normal = np.cross(triangles[..., 1, :] - triangles[..., 0, :], triangles[..., 2, :] - triangles[..., 0, :])
+        length = np.linalg.norm(normal, axis=2)
+        radiance = light.area * power / np.maximum(length.sum(axis=0) / 2, _LEAST_AREA)
         is_there = length > 2 * _LEAST_AREA
-        triangles, normal = triangles[is_there], normal[is_there] / length[is_there, None]
-        middle = triangles.reshape(-1, 3).mean(axis=0) if len(triangles) else np.zeros(3)
-        radius = np.linalg.norm(triangles - middle, axis=2).max(initial=0)
-        arrays = (np.ascontiguousarray(array, np.float32) for array in (triangles, normal, radiance[is_there], middle))
-        return cls(light, strata, *arrays, np.float32(radius))
+        corners, normal = triangles[is_there], normal[is_there] / length[is_there, None]
+        center = corners.reshape(-1, 3).mean(axis=0) if len(corners) else np.zeros(3)
+        return cls(
+            light,
+            strata,
+            triangles=np.ascontiguousarray(corners, np.float32),
+            normal=np.asarray(normal, np.float32),
+            radiance=np.broadcast_to(radiance, length.shape)[is_there].astype(np.float32),
+            center=np.asarray(center, np.float32),
+            radius=np.float32(np.linalg.norm(corners - center, axis=2).max(initial=0)),
+        )
+
+
+def _halves(
+    light: LocalLight, strata: LightStrata
+) -> tuple[Shaped[NDArray[np.float64], " pieces"], Shaped[NDArray[np.float64], "halves pieces 3 3"]]:
+    """Return the share of each piece of a light in its power, and the piece as one or two triangles."""
+    power = np.diff(light.power_cdf, prepend=0).astype(np.float64)
+    if len(power) > _MOST_TRIANGLES:
+        corners = make_emitter_parts(light, strata).corners[-len(strata.uv) :].astype(np.float64)
+        return np.full(len(corners), 1 / len(corners)), np.stack([corners[:, :3], corners[:, [0, 2, 3]]])
+    corner, edges = light.corner[:, None].astype(np.float64), light.edges.astype(np.float64)
+    first = np.concatenate([corner, corner + edges], axis=1)
+    if not light.is_rectangle:
+        return power, first[None]
+    opposite = corner + edges.sum(axis=1, keepdims=True)
+    return power, np.stack([first, np.concatenate([opposite, first[:, 2:], first[:, 1:2]], axis=1)])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def mirror_direction(points, p, wo):  # type: ignore[no-untyped-def]
-    """Mirror direction of a point, a tuple."""
+    """Mirror direction of a point, a tuple. points, p: the point. wo: view directions. (n, 3)"""
     n, o = points.normal[p], wo[p]
     twice = _TWO * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
     return twice * n[0] - o[0], twice * n[1] - o[1], twice * n[2] - o[2]

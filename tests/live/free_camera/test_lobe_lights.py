@@ -7,7 +7,7 @@ from tiny_scenes import make_camera, quad
 
 from relume.brdf.lobe_sampling import lobe_of
 from relume.core.cache import Cache
-from relume.lights.local_lights import make_light_strata, prepare_local_lights
+from relume.lights.local_lights import LightTriangles, make_light_strata, prepare_local_lights
 from relume.live.free_camera import lobe_coverage
 from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.opened.openers import open_bake
@@ -75,6 +75,16 @@ def test_triangles_of_lights():
     np.testing.assert_allclose(emitter.radiance, 1, rtol=1e-5)
     np.testing.assert_allclose(emitter.normal, [[0, -1, 0]] * 2, atol=1e-6)
     np.testing.assert_allclose(emitter.radius, np.hypot(0.2, 0.1), rtol=0.1)
+    # a mesh of many triangles keeps its power
+    corners = np.random.default_rng(2).normal(0, 1, (300, 3, 3)).astype(np.float32)
+    mesh = prepare_local_lights(
+        LightGeometry("mesh", material="Lamp"), LightTriangles(corners, np.ones(300, np.float32), is_two_sided=True)
+    )
+    emitter = LobeEmitter.from_light(mesh, make_light_strata(mesh, 16))
+    edges = emitter.triangles[:, 1:] - emitter.triangles[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
+    assert len(area) <= 128
+    np.testing.assert_allclose((area * emitter.radiance).sum(), mesh.area, rtol=1e-4)
     point = prepare_local_lights(LightGeometry("point", position=(0.0, 1.0, 0.0)))
     assert not len(LobeEmitter.from_light(point, make_light_strata(point, 16)).triangles)
 
@@ -100,7 +110,7 @@ def test_the_reflection_of_an_area_light_is_that_of_the_exact_view_without_speck
     look = validate(complete({}, bake.default_look), bake.default_look)
     moving = render_image(bake, "front", look)[..., :3]
     exact = render_image(bake, "front", look, static_views=builder)[..., :3]
-    # the mirror image of the lamp, without the lamp
+    # the mirror image of the light, without the light itself
     is_floor = (np.arange(SIZE[1]) > 0.45 * SIZE[1])[:, None] & (exact.max(axis=2) > 0)
     is_lit = is_floor & (exact.max(axis=2) > 1)
     assert is_lit.sum() > 50
