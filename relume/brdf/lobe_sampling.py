@@ -17,6 +17,7 @@ only decides where in the band it goes: lobes narrower than a band keep shape an
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,8 +26,9 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from relume.brdf.curves import curve_values
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.registry import TERMS
-from relume.brdf.roughness_levels import RoughnessLevels
+from relume.brdf.roughness_levels import NO_LEVELS, RoughnessLevels
 from relume.brdf.term import Angle, Curve
 from relume.math.angle_bands import MAX_ANGLE, band_edges
 
@@ -109,6 +111,16 @@ def sample_lobe(document: Mapping[str, Any], levels: RoughnessLevels) -> LobeSam
     arrays = np.array(quantiles, np.float32), np.array(densities, np.float32)
     lobe = LobeSampling(angles, (-x, -y, z), *arrays, median)
     return lobe if lobe.is_narrow.any() else None
+
+
+def lobe_of(document: Mapping[str, Any]) -> LobeSampling | None:
+    """Return `sample_lobe` of a term without a roughness map, cached. Its color and its texture do not matter."""
+    return _lobe_of(FrozenTerm.from_document(document, color=(1.0, 1.0, 1.0), texture=None))
+
+
+@lru_cache(maxsize=64)
+def _lobe_of(term: FrozenTerm) -> LobeSampling | None:
+    return sample_lobe(term.document, NO_LEVELS)
 
 
 def _sample_curve(document: Mapping[str, Any], curve: Curve) -> tuple[F64, F64] | None:

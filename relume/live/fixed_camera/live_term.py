@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.lobe_sampling import LobeSampling, lobe_curves, sample_lobe
+from relume.brdf.lobe_sampling import LobeSampling, lobe_curves, lobe_of, sample_lobe
 from relume.brdf.roughness_levels import RoughnessLevels
 from relume.brdf.specular import specular_albedo
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -96,7 +96,9 @@ class LiveTerm:
     def lobe(self) -> LobeSampling | None:
         """The lobe along which rays are traced in the newest look; None if it is wide."""
         if self._lobe_document is not self.document:
-            self._lobe_document, self._lobe = self.document, sample_lobe(self.document, self.levels)
+            has_levels = bool(self.levels.pairs)
+            self._lobe = sample_lobe(self.document, self.levels) if has_levels else lobe_of(self.document)
+            self._lobe_document = self.document
         return self._lobe
 
     def lobe_beside(self, basis: EditBasis) -> LobeSampling | None:
@@ -156,6 +158,17 @@ class LiveTerm:
         if self.displayed is self.ready:
             self.displayed, self.is_composed = image, False
         return image
+
+    def keeps_showing(self, reference: DisplayedImage) -> bool:
+        """Return whether the displayed image is a copy of a reference image, which shows the target's curves."""
+        displayed = self.displayed
+        is_copy = displayed.reference is reference and displayed.bands is reference.bands
+        is_copy &= displayed.fidelity == Fidelity.APPROXIMATE
+        return is_copy and not reference.changed_curves(self.target_bands)
+
+    def keep_image(self, light: Illumination) -> None:
+        """Show the displayed image in another light; it need not be composed again."""
+        self.ready = self.displayed = replace(self.displayed, light=light)
 
     def display_ready(self) -> None:
         """Display the newest image, if there is one."""

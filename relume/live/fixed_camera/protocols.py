@@ -213,15 +213,14 @@ class OpenBake(Protocol):
 
 
 class LobeShader(Protocol):
-    """Images of narrow terms by few rays a sample; `relume.live.opened.few_lobe_rays` implements it."""
+    """Images of narrow terms by few rays a sample; `relume.live.opened.few_lobe_rays` implements it.
 
-    def is_prepared(self, light: Illumination) -> bool:
-        """Return whether `shade` has all that takes longer than a frame. light: the illumination"""
-        ...
+    Attributes:
+        light: the illumination whose light of patches it has.
+    """
 
-    def prepare(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Cache all that `shade` needs besides rays. light: the illumination. is_canceled: polled"""
-        ...
+    @property
+    def light(self) -> Illumination: ...
 
     def shade(
         self,
@@ -230,7 +229,6 @@ class LobeShader(Protocol):
         view: View,
         material: int,
         light: Illumination,
-        patch_light: Illumination,
         document: Mapping[str, Any],
     ) -> Shaped[F32, "n 3"] | None:
         """Return the radiance of samples for a white term, without its texture; None if its lobe is wide.
@@ -238,7 +236,7 @@ class LobeShader(Protocol):
         Args:
             samples: all samples of a material of a view. receivers: the same, without light.
             view, material: the view, and the index.
-            light: the illumination. patch_light: a similar one, for which this is prepared. document: the term.
+            light: the illumination, which differs from its own in reflectances alone. document: the term.
         """
         ...
 
@@ -339,9 +337,14 @@ class FixedViewTransfer(OpenBake, Protocol):
         """
         ...
 
-    @property
-    def few_lobe_rays(self) -> LobeShader:
-        """Images of narrow terms by few rays a sample."""
+    def few_lobe_rays(self, light: Illumination, is_canceled: Callable[[], bool]) -> LobeShader:
+        """Prepare images of narrow terms by few rays a sample; takes seconds.
+
+        Args:
+            light: the illumination. is_canceled: polled.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
         ...
 
     def downsampled(self, view_name: str, step: int) -> Self:

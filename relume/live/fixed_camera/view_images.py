@@ -37,6 +37,7 @@ from relume.live.fixed_camera.protocols import (
     FixedViewTransfer,
     LightQuality,
     LightsAndPoints,
+    LobeShader,
     PatchRadiance,
 )
 from relume.look import Look, TermLook, validate
@@ -87,6 +88,7 @@ class ViewImages:
         glass_factors: factors of the samples that preview edited glass, in the view's order; None for 1.
         region: visible pixels of the image: x, y, width, height; None: all.
         outgoing_change: of the last incremental update, for the next term.
+        lobe_shader: of the last light that it was prepared for; None before.
     """
 
     def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
@@ -103,6 +105,7 @@ class ViewImages:
         self.glass_factors: F32 | None = None
         self.region: Tile | None = None
         self.outgoing_change: OutgoingChange | None = None
+        self.lobe_shader: LobeShader | None = None
 
     def view_with_overrides(self, look: Look) -> ViewImages:
         """Return the images of the view with the roughness- and normal-map overrides of a look; self if they are

@@ -94,7 +94,8 @@ class FreeCameraPicture:
         self._residual_image: F32 | None = None  # residual that is added to the frame
         self._is_refined = False  # a job has refined the frame since the last step
         self.renders_pixels = True
-        self._lobe_scene: tuple[Illumination, LobeScene] | None = None  # of the latest light that it is known for
+        # of the latest light that it is known for, with and without indirect light
+        self._lobe_scenes: dict[bool, tuple[Illumination, LobeScene]] = {}
         self._narrow_look: tuple[Look | None, bool] = None, False  # whether the look has narrow terms
         self._published_vectors: IncidentCoefficients | None = None
         self._vectors_version = self._materials_version = 0
@@ -172,7 +173,7 @@ class FreeCameraPicture:
             return None
         if self._look is not None and self._has_narrow_lobes(self._look):
             light = self._current_light()
-            if self._lobe_scene is None or self._lobe_scene[0] != light:
+            if light.paths.has_indirect and not self._is_lobe_scene_current(light):
                 return self._lobe_job(light)
         return self._refine_job()
 
@@ -392,6 +393,11 @@ class FreeCameraPicture:
         """The scene."""
         return self._transfer.stored_scene
 
+    @property
+    def material_names(self) -> Sequence[str]:
+        """Material names in the scene's order."""
+        return self._transfer.material_names
+
     def _current_light(self) -> Illumination:
         assert self._light is not None
         return self._light
@@ -446,15 +452,28 @@ class FreeCameraPicture:
         assert self._look is not None
         if not self.renders_pixels or not self._has_narrow_lobes(self._look):
             return None
-        if not self._is_watched and (self._lobe_scene is None or self._lobe_scene[0] != light):
-            self._lobe_scene = light, self._transfer.lobe_scene(light, lambda: False)
-        return None if self._lobe_scene is None else self._lobe_scene[1]
+        has_indirect = light.paths.has_indirect
+        # without indirect light, nothing is solved
+        if not (self._is_watched and has_indirect) and not self._is_lobe_scene_current(light):
+            self._keep_lobe_scene(light, self._transfer.lobe_scene(light, lambda: False))
+        latest = self._lobe_scenes.get(has_indirect) or self._lobe_scenes.get(False)
+        return None if latest is None else latest[1]
+
+    def _keep_lobe_scene(self, light: Illumination, scene: LobeScene) -> None:
+        """Keep the scene that lobe rays meet in a light; copies of the picture keep theirs."""
+        self._lobe_scenes = {**self._lobe_scenes, light.paths.has_indirect: (light, scene)}
+
+    def _is_lobe_scene_current(self, light: Illumination) -> bool:
+        """Return whether the scene that lobe rays meet is known in a light."""
+        scene = self._lobe_scenes.get(light.paths.has_indirect)
+        return scene is not None and scene[0] == light
 
     def _lobe_job(self, light: Illumination) -> Job:
         """Return the job for the light that lobe rays meet; until then rays meet that of the previous look."""
 
         def display(scene: LobeScene) -> None:
-            self._lobe_scene, self._materials, self._displayed = (light, scene), (None, self._materials[1]), None
+            self._keep_lobe_scene(light, scene)
+            self._materials, self._displayed = (None, self._materials[1]), None
 
         return Job(
             ("lobe rays", self._transfer.key, light),

@@ -1,17 +1,14 @@
 """Mean incident radiance along few lobe rays of each point, while a camera moves.
 
-    L̄ = Σ_r L(ω_r) / N + Σ_k V_k E_k p(ω_k)
+    L̄ = Σ_r L(ω_r) / N + light of `relume.live.free_camera.lobe_lights`
 
-Rays r are drawn from the inner half of the lobe with density p, so that B = a(θo) L̄ with the directional albedo a. The
-tail would be noise: a ray that leaves the scene brings the environment blurred by the core and by the tail, half each.
-Small bright lights k of the environment, and local lights, are no chance hits of rays but evaluated by p, with one
-shadow ray each.
+Rays r are drawn from the inner half of the lobe, so that B = a(θo) L̄ with the directional albedo a. The tail would be
+noise: a ray that leaves the scene brings the environment blurred by the core and by the tail, half each.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numba as nb
 import numpy as np
@@ -22,33 +19,18 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.environment_lookup import add_environment, blur_level
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.normal_mapping import normalize
-from relume.math.fast_math import acos_clamped
+from relume.live.free_camera.lobe_lights import disk_radius
 from relume.math.rgb9e5 import unpack_rgb9e5
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import (
     LobePattern,
-    angle_at_quantile,
-    lobe_density,
-    lobe_direction,
     lobe_shift,
-    ray_jitter,
 )
-from relume.raytrace.ray_packet import (
-    LANES,
-    enable_lane,
-    is_unoccluded,
-    new_packet,
-    set_direction,
-    set_origin,
-    trace_shadows,
-)
-from relume.transport.lobe_hits import half_vector_spread, jittered_frame, lobe_ray_in_pixel, trace_lobe_rays
+from relume.transport.lobe_hits import lobe_ray_in_pixel, trace_lobe_rays
 from relume.transport.lobe_paths import ESCAPE, REFLECTION, TRANSMISSION
 from relume.transport.lobe_rays import from_patch, isotropic_at, texels_at
 from relume.transport.lobe_scene import LobeScene
-from relume.transport.patch_lookup import tangents_of
-from relume.transport.shading_points import LocalRays, ShadingPoints, build_ray_lists
+from relume.transport.shading_points import ShadingPoints
 
 F32 = NDArray[np.float32]
 
@@ -62,12 +44,6 @@ _MARGIN = np.float32(1.5)  # around a bright light, which blurred texels exclude
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _radius(variance):  # type: ignore[no-untyped-def]
-    """Radius of a disk of directions, radians. variance: 1 − R, with the length R of their mean"""
-    return _TWO * np.float32(math.sqrt(max(variance, np.float32(1e-8))))
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _add_escaping(environment, sigma, world, gain, scratch, out):  # type: ignore[no-untyped-def]
     """Add the environment along a ray, without its bright lights.
 
@@ -78,7 +54,7 @@ def _add_escaping(environment, sigma, world, gain, scratch, out):  # type: ignor
     level, lights = blur_level(sigma[0]), environment.bright_lights
     for k in range(lights.shape[0]):
         cosine = lights[k, 0] * world[0] + lights[k, 1] * world[1] + lights[k, 2] * world[2]
-        radius = _MARGIN * _radius(lights[k, 6])
+        radius = _MARGIN * disk_radius(lights[k, 6])
         if cosine > _ONE - _HALF * radius * radius:
             level = max(level, _ONE)
     scratch[0] = scratch[1] = scratch[2] = 0
@@ -165,121 +141,6 @@ def _mean_radiance(points, wo, footprint, hits, pattern, light_args, environment
             out[p, channel] = scale * light[channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _density(pattern, wi, wo):  # type: ignore[no-untyped-def]
-    """Density p of one ray in a direction, per steradian. wi, wo: local, tuples"""
-    if wi[2] <= 0:
-        return _ZERO
-    if pattern.is_half_angle:
-        hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
-        length = np.float32(math.sqrt(hx * hx + hy * hy + hz * hz)) + np.float32(1e-6)
-        angle, cos_theta_d = acos_clamped(hz / length), _HALF * length
-    else:
-        angle, cos_theta_d = acos_clamped(wi[2] * wo[2] - wi[0] * wo[0] - wi[1] * wo[1]), _ONE
-    band = min(int(pattern.scale * angle), pattern.band_density.shape[1] - 1)
-    return lobe_density(pattern, 0, band, cos_theta_d) / np.float32(pattern.uv.shape[0])
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def _local(frame, d):  # type: ignore[no-untyped-def]
-    """Direction d in a frame of tangent, bitangent and normal, tuples."""
-    t, b, n = frame
-    return (
-        t[0] * d[0] + t[1] * d[1] + t[2] * d[2],
-        b[0] * d[0] + b[1] * d[1] + b[2] * d[2],
-        n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
-    )
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _mean_density(points, p, wo, footprint, pattern, widths, direction, radius):  # type: ignore[no-untyped-def]
-    """Mean density p of a disk of directions over the part of a pixel that a point shows, per steradian.
-
-    Whichever is wider, lobe or disk, is evaluated at directions from the other.
-
-    Args:
-        points, p: the point. wo: view directions. footprint: of each point, or one. pattern: `LobePattern`.
-        widths: median and 99.9th percentile of the angles of ωi to the mirror direction, radians.
-        direction: center of the disk, a tuple. radius: radians.
-    """
-    normal, spread, seed = points.normal[p], half_vector_spread(footprint, p), points.seed[p]
-    part = footprint[min(p, footprint.shape[0] - 1)]
-    cosine = normal[0] * wo[p, 0] + normal[1] * wo[p, 1] + normal[2] * wo[p, 2]
-    mirrored = _ZERO
-    for axis in range(3):
-        mirrored += direction[axis] * (_TWO * cosine * normal[axis] - wo[p, axis])
-    if acos_clamped(mirrored) > radius + widths[1] + _TWO * spread:
-        return _ZERO
-    is_wide, ratio = widths[0] > radius, spread / max(widths[0], radius)
-    num = min(int(_LEAST_JITTERS + _JITTERS_OF_EQUAL * ratio * ratio), _MOST_JITTERS)
-    d_t, d_b = tangents_of(direction)
-    sin_radius, half_chord, total = np.float32(math.sin(radius)), np.float32(math.sin(_HALF * radius)), _ZERO
-    chord_squared = np.float32(4) * half_chord * half_chord  # by π the solid angle: 2π (1 − cos ρ) = 4π sin² ρ/2
-    for k in range(num):
-        u, v = ray_jitter(k, seed)
-        (t, b, n), o = jittered_frame(normal, points.tangent[p], wo[p], part, u - _HALF, v - _HALF)
-        r, azimuth = ray_jitter(k, np.uint32(seed) ^ _DIRECTION_SEED)
-        if is_wide:
-            r, azimuth = sin_radius * np.float32(math.sqrt(r)), _TWO * _PI * azimuth
-            x, y = r * np.float32(math.cos(azimuth)), r * np.float32(math.sin(azimuth))
-            d = (
-                direction[0] + x * d_t[0] + y * d_b[0],
-                direction[1] + x * d_t[1] + y * d_b[1],
-                direction[2] + x * d_t[2] + y * d_b[2],
-            )
-            total += _density(pattern, _local((t, b, n), normalize(d)), o)
-        else:
-            angle = angle_at_quantile(pattern.quantile, 0, r)
-            (x, y, z), is_valid = lobe_direction(pattern.is_half_angle, angle, azimuth, o[0], o[1], o[2])
-            local = _local((t, b, n), direction)
-            dx, dy, dz = x - local[0], y - local[1], z - local[2]
-            if is_valid and z > 0 and dx * dx + dy * dy + dz * dz < chord_squared:
-                total += _ONE
-    scale = _ONE if is_wide else _ONE / (_PI * chord_squared)
-    return scale * total / np.float32(num)
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environment, start, stop, out):  # type: ignore[no-untyped-def]
-    """Add the bright lights of the environment at points [start, stop). tracer: of shadows. out: added to. (n, 3)"""
-    packet, lights = new_packet(tracer), environment.bright_lights
-    density = np.empty(LANES, np.float32)
-    for k in range(lights.shape[0]):
-        d, radius = (lights[k, 0], lights[k, 1], lights[k, 2]), _radius(lights[k, 6])
-        for first in range(start, stop, LANES):
-            width, num_lit = min(LANES, stop - first), 0
-            for lane in range(LANES):
-                p = first + min(lane, width - 1)
-                position = points.position[p]
-                density[lane] = (
-                    _mean_density(points, p, wo, footprint, pattern, widths, d, radius) if lane < width else _ZERO
-                )
-                set_origin(packet, lane, position[0], position[1], position[2])
-                set_direction(packet, lane, d[0], d[1], d[2], np.float32(np.inf))
-                enable_lane(packet, lane, density[lane] > 0)
-                num_lit += density[lane] > 0
-            if num_lit == 0:
-                continue
-            trace_shadows(packet)
-            for lane in range(width):
-                if density[lane] > 0 and is_unoccluded(packet, lane):
-                    for channel in range(3):
-                        weight = density[lane] * environment.gain[channel]
-                        out[first + lane, channel] += weight * lights[k, 3 + channel]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_local(pattern, listed, start, stop, out):  # type: ignore[no-untyped-def]
-    """Add the light of listed rays at points [start, stop). listed: `ListedRays`. out: added to. (n, 3)"""
-    for p in range(start, stop):
-        for ray in range(listed.first[p - start], listed.first[p - start + 1]):
-            wi = listed.wi[0, ray], listed.wi[1, ray], listed.wi[2, ray]
-            wo = listed.wo[0, ray], listed.wo[1, ray], listed.wo[2, ray]
-            density = _density(pattern, wi, wo) / max(wi[2], np.float32(1e-3))
-            for channel in range(3):
-                out[p, channel] += density * listed.irradiance[channel, ray]
-
-
 def mean_lobe_radiance(
     scene: LobeScene,
     environment: PrefilteredEnvironment,
@@ -316,36 +177,3 @@ def mean_lobe_radiance(
     )
     parallel_for_chunks(lambda start, stop: _mean_radiance(*args, start, stop, out), points.num_points)
     return out
-
-
-def add_direct_lights(
-    scene: LobeScene,
-    environment: PrefilteredEnvironment,
-    receivers: ShadingPoints,
-    footprint: Shaped[F32, "#n 2 2 3"],
-    pattern: LobePattern,
-    local_rays: Sequence[LocalRays],
-    radiance: Shaped[F32, "n 3"],
-) -> None:
-    """Add the direct light of bright lights of the environment, and of local lights.
-
-    Args:
-        scene, environment, receivers, footprint: as in `mean_lobe_radiance`. pattern: of the whole lobe.
-        local_rays: of local lights to the points. radiance: L̄ of each point, added to.
-    """
-    tracer = scene.geometry.embree.shadow_tracer(coherent=True)
-    args = tracer, receivers.points, receivers.wo, footprint, pattern, lobe_widths(pattern), environment
-
-    def kernel(start: int, stop: int) -> None:
-        _add_bright_lights(*args, start, stop, radiance)
-        for rays in local_rays:
-            _add_local(pattern, build_ray_lists(rays, receivers, start, stop), start, stop, radiance)
-
-    parallel_for_chunks(kernel, receivers.points.num_points)
-
-
-def lobe_widths(pattern: LobePattern) -> Shaped[F32, " 2"]:
-    """Return the median and the 99.9th percentile of the angles of ωi to the mirror direction, radians."""
-    last = pattern.quantile.shape[1] - 1
-    angle = pattern.quantile[0, [last // 2, int(0.999 * last)]] * (2 if pattern.is_half_angle else 1)
-    return np.asarray(angle, np.float32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,9 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import directional_albedo
-from relume.brdf.frozen_term import FrozenTerm
-from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
-from relume.brdf.roughness_levels import NO_LEVELS
+from relume.brdf.lobe_sampling import LobeSampling, lobe_of
 from relume.brdf.texture_slots import texture_slot
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS, cosines
@@ -37,19 +34,18 @@ class TracedLobe(NamedTuple):
 
 def has_traced_lobe(terms: Terms) -> bool:
     """Return whether a material has narrow terms. terms: of a complete look"""
-    return any(_round_lobe(FrozenTerm.from_document(term)) is not None for term in terms)
+    return any(_round_lobe(term) is not None for term in terms)
 
 
-@lru_cache(maxsize=64)
-def _round_lobe(term: FrozenTerm) -> LobeSampling | None:
+def _round_lobe(term: Mapping[str, Any]) -> LobeSampling | None:
     """Return the distribution of rays of a term; None if its lobe is wide or anisotropic."""
-    sampling = sample_lobe(term.document, NO_LEVELS)
+    sampling = lobe_of(term)
     return sampling if sampling is not None and sampling.is_round else None
 
 
 def split_terms(terms: Terms) -> tuple[TracedLobe | None, Terms]:
     """Split the terms of a material into narrow ones, None for none, and the others. terms: of a complete look"""
-    samplings = [_round_lobe(FrozenTerm.from_document(term)) for term in terms]
+    samplings = [_round_lobe(term) for term in terms]
     narrow = [term for term, sampling in zip(terms, samplings, strict=True) if sampling is not None]
     if not narrow:
         return None, terms

@@ -55,9 +55,9 @@ class GBuffer(NamedTuple):
             lattice_node=self.lattice_node[rows], weight=self.weight[rows], glass=NO_GLASS,
         )  # fmt: skip
 
-    def pixel_of_ray(self, num_pixels: int) -> Shaped[NDArray[np.intp], " n"]:
+    def pixel_of_ray(self, num_pixels: int) -> Shaped[NDArray[np.int32], " n"]:
         """Return the pixel of each ray. num_pixels: number of pixels of the image"""
-        pixel = np.concatenate([np.arange(num_pixels), self.owner])
+        pixel = np.concatenate([np.arange(num_pixels, dtype=np.int32), self.owner])
         return np.concatenate([pixel, pixel[self.glass.ray]])
 
     def with_glass_rules(

@@ -18,14 +18,14 @@ from relume.live.free_camera.free_view import FreeView
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
+from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import EnvironmentKey, LightGeometry
+from relume.look.model import Rgb
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.lobe_scene import LobeScene
-from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
 
@@ -145,8 +145,8 @@ class FreeCameraTransfer(OpenBake, Protocol):
         """
         ...
 
-    def lobe_local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
-        """Return the rays of local lights to points, few for each light. light: the illumination"""
+    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
+        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
         ...
 
     def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:

@@ -81,6 +81,10 @@ class CorrectionSamples(NamedTuple):
         x = ((np.arange(self.width) + 0.5) * width / self.width).astype(np.int64)
         return self._replace(material=np.where(is_near_edge[y][:, x].ravel(), np.int32(-1), self.material))
 
+    def exclude_materials(self, materials: Shaped[NDArray[np.integer], " m"]) -> CorrectionSamples:
+        """Exclude samples of some materials."""
+        return self._replace(material=np.where(np.isin(self.material, materials), np.int32(-1), self.material))
+
 
 def residual(
     radiance: Shaped[F32, "h w 3"], exact: Shaped[F32, "h w 3"], samples: CorrectionSamples, pixels: CorrectionSamples

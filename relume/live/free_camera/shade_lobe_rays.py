@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
@@ -30,6 +31,7 @@ from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.surface_textures import NORMAL_MAP
 from relume.raytrace.texture_kernels import sample_texture
 from relume.scene.model import Camera
+from relume.transport.lobe_hits import NO_FOOTPRINT
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.patch_lookup import tangents_of
 from relume.transport.shading_points import ShadingPoints
@@ -132,16 +134,30 @@ def add_lobe_rays(
         gbuffer: G-buffer of the rays. camera: of the image. size: of the image, pixels.
         rays: the rays to shade; None: all. out: radiance, added to.
     """
-    face = gbuffer.hits.face if rays is None else gbuffer.hits.face[rays]
-    material = np.where(face >= 0, stored_scene.face_material[np.maximum(face, 0)], -1)
-    has_weight = gbuffer.weight.any(axis=1) if rays is None else gbuffer.weight[rays].any(axis=1)
-    chosen = {k: np.flatnonzero((material == k) & has_weight) for k, lobe in enumerate(lobes) if lobe is not None}
-    num_points = sum(map(len, chosen.values()))
-    scene_args = transfer, stored_scene, lobe_scene, light, environment, gbuffer, camera, size
-    for k, index in chosen.items():
-        if len(index):
-            rows = (index if rays is None else rays[index]).astype(np.int32)
-            _add_lobe(*scene_args, lobes[k], MAX_RAYS / num_points, rows, out)
+    num_rays = len(gbuffer.hits.face) if rays is None else len(rays)
+    is_traced = np.array([lobe is not None for lobe in lobes])
+    material, all_rays = np.empty(num_rays, np.int32), np.empty(0, np.int32) if rays is None else rays
+    hit_args = gbuffer.hits.face, gbuffer.weight, stored_scene.face_material, is_traced, all_rays
+    parallel_for_chunks(lambda start, stop: _find_materials(*hit_args, start, stop, material), num_rays)
+    found = np.flatnonzero(material >= 0).astype(np.int32)
+    if not len(found):
+        return
+    pixel = gbuffer.pixel_of_ray(size[0] * size[1]) if size[0] else np.zeros(len(gbuffer.hits.face), np.int32)
+    scene_args = transfer, stored_scene, lobe_scene, light, environment, gbuffer, camera
+    for k in np.unique(material[found]):
+        index = found[material[found] == k]
+        rows = index if rays is None else rays[index]
+        _add_lobe(*scene_args, lobes[k], MAX_RAYS / len(found), rows, ImagePoints.from_pixels(pixel[rows], size), out)
+
+
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def _find_materials(face, weight, face_material, is_traced, rays, start, stop, out):  # type: ignore[no-untyped-def]
+    """Write the material of hits with lattice nodes whose lobes are traced, −1 for others. rays: empty for all"""
+    for i in range(start, stop):
+        p = rays[i] if rays.shape[0] else i
+        f = face[p]
+        has_nodes = weight[p, 0] != 0 or weight[p, 1] != 0 or weight[p, 2] != 0
+        out[i] = face_material[f] if f >= 0 and has_nodes and is_traced[face_material[f]] else -1
 
 
 def _add_lobe(
@@ -152,35 +168,29 @@ def _add_lobe(
     environment: PrefilteredEnvironment,
     gbuffer: GBuffer,
     camera: Camera,
-    size: tuple[int, int],
     lobe: TracedLobe | None,
     rays_per_point: float,
     rows: I32,
+    image: ImagePoints,
     out: F32,
 ) -> None:
     """Add the reflections of one material.
 
     Args:
-        transfer, stored_scene, lobe_scene, light, environment, gbuffer, camera, size, out: of `add_lobe_rays`.
+        transfer, stored_scene, lobe_scene, light, environment, gbuffer, camera, out: of `add_lobe_rays`.
         lobe: of the material. rays_per_point: mean number that time allows. rows: rays that hit it, ascending.
+        image: their pixels.
     """
     assert lobe is not None
-    scene_args = stored_scene.pixel_arrays(), gbuffer
-    position, pixel_angle = camera.to_world[:3, 3].astype(np.float32), np.float32(camera.yfov / size[1])
+    scene_args, (width, height) = (stored_scene.pixel_arrays(), gbuffer), image.size
+    position, pixel_angle = camera.to_world[:3, 3].astype(np.float32), np.float32(camera.yfov / height)
     wo, origins, normals, tangents = np.empty((4, len(rows), 3), np.float32)
     points = SurfacePoints(origins, normals, tangents, np.empty(len(rows), np.uint32))
     point_args = *scene_args, position, np.float32(lobe_scene.surfaces.offset), pixel_angle, rows
     parallel_for_chunks(lambda start, stop: _find_points(*point_args, start, stop, points, wo), len(rows))
     receivers = ShadingPoints(points, wo, np.empty((len(rows), 0), np.uint8))
-    num_centers = int(np.searchsorted(rows, size[0] * size[1]))
-    footprint = np.zeros((len(rows), 2, 2, 3), np.float32)
-    centers = slice(0, num_centers)
-    footprint[centers] = pixel_footprint(rows[centers], size[0], points.rows(centers), wo[centers])
-    is_center = np.arange(len(rows)) < num_centers
-    pixel = gbuffer.pixel_of_ray(size[0] * size[1])[rows] if num_centers else np.zeros(len(rows), np.intp)
-    image = ImagePoints(pixel, is_center, size)
+    footprint = pixel_footprint(image.pixel, width, points, wo) if width else NO_FOOTPRINT
     light_args = lobe_scene, environment, receivers, footprint, lobe, image, rays_per_point
-    local_rays = transfer.lobe_local_rays(light, points)
-    radiance = lobe_radiance(*light_args, local_rays, is_direct=light.paths.direct)
+    radiance = lobe_radiance(*light_args, transfer.lobe_emitters(light), is_direct=light.paths.direct)
     args = *scene_args, pixel_angle, lobe.albedo, points, wo, radiance, rows
     parallel_for_chunks(lambda start, stop: _add_lobes(*args, start, stop, out), len(rows))

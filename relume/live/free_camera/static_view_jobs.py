@@ -9,12 +9,14 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.specular import is_mirror
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, RelumeError, ResultUnavailableError
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.fixed_camera.protocols import StaticViewFactory
+from relume.live.fixed_camera.view_images import material_documents
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.residual_correction import CorrectionSamples, residual
 from relume.look import Look
@@ -127,9 +129,10 @@ def _sparse_residual(
         return None
     picture.set_look(look, solo=direct_view.solo)
     radiance, sample_gbuffer = picture.render_pixel_centers(coarse_size)
-    samples = CorrectionSamples.from_gbuffer(
-        picture.stored_scene, sample_gbuffer, camera, coarse_size[0]
-    ).exclude_edges(gbuffer.owner, size)
+    # in direct light alone, mirrors of the exact image reflect lit surfaces, and lobe rays of the other reflect none
+    mirrors = [is_mirror(material_documents(look, name)) for name in picture.material_names]
+    samples = CorrectionSamples.from_gbuffer(picture.stored_scene, sample_gbuffer, camera, coarse_size[0])
+    samples = samples.exclude_edges(gbuffer.owner, size).exclude_materials(np.flatnonzero(mirrors))
     pixels = CorrectionSamples.from_gbuffer(
         picture.stored_scene, gbuffer.pixel_centers(size[0] * size[1]), camera, size[0]
     )

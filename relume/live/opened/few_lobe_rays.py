@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
+import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.numba_options import NO_REFCOUNT
+from relume.core.thread_pools import parallel_for_chunks
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import Samples
-from relume.live.free_camera.basis.outgoing_coefficients import cosines
+from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
+from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
 from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
+from relume.look.model import Rgb
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.shading_points import ShadingPoints
@@ -41,46 +45,39 @@ class LobeSource(EnvironmentSource, Protocol):
         """
         ...
 
+    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
+        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+        ...
+
 
 @dataclass(frozen=True)
 class FewLobeRays:
-    """Shades narrow terms of an opened bake by few rays a sample. See `relume.live.free_camera.lobe_radiance`."""
+    """Shades narrow terms of an opened bake by few rays a sample. See `relume.live.free_camera.lobe_radiance`.
+
+    Attributes:
+        light_transport: the bake. light: the illumination. outgoing: of patches in that light.
+        environment: behind the scene.
+    """
 
     light_transport: LobeSource
+    light: Illumination
+    outgoing: OutgoingLight
+    environment: PrefilteredEnvironment
 
-    @cached_property
-    def _environments(self) -> PrefilteredEnvironments:
-        return PrefilteredEnvironments(self.light_transport)
+    @classmethod
+    def prepare(cls, light_transport: LobeSource, light: Illumination, is_canceled: CancelCheck) -> Self:
+        """Compute all that takes longer than a frame.
 
-    def _outgoing(self, light: Illumination, is_canceled: CancelCheck = lambda: False) -> OutgoingLight:
-        """Return the outgoing light of patches, cached. light: the illumination. is_canceled: polled"""
-        transport = self.light_transport
-        return transport.cache.transient.get_value(
-            self._outgoing_key(light), lambda: transport.lobe_scene(light, is_canceled).outgoing
-        )
-
-    def _outgoing_key(self, light: Illumination) -> tuple[Hashable, ...]:
-        return self.light_transport.key, "patch light of lobe rays", light
-
-    def environment(self, light: Illumination) -> PrefilteredEnvironment:
-        """Return the environment behind a scene, cached. light: the illumination"""
-        environment = light.environment
-        lookup, bright_lights = (
-            self._environments.environment_lookup(environment.map),
-            self._environments.bright_lights(environment),
-        )
+        Args:
+            light_transport: the bake. light: the illumination. is_canceled: polled.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
+        environments, key = PrefilteredEnvironments(light_transport), light.environment
+        lookup, bright_lights = environments.environment_lookup(key.map), environments.bright_lights(key)
         gain = np.array(light.environment_gain, np.float32)
-        return PrefilteredEnvironment(lookup, bright_lights, rotation_of(environment.rotation), gain)
-
-    def is_prepared(self, light: Illumination) -> bool:
-        """Return whether `shade` has all that takes longer than a frame. light: the illumination"""
-        has_environment = self._environments.has_environment_lookup(light.environment.map)
-        return has_environment and self.light_transport.cache.transient.contains(self._outgoing_key(light))
-
-    def prepare(self, light: Illumination, is_canceled: CancelCheck) -> None:
-        """Cache all that `shade` needs besides rays. light: the illumination. is_canceled: polled"""
-        self.environment(light)
-        self._outgoing(light, is_canceled)
+        environment = PrefilteredEnvironment(lookup, bright_lights, rotation_of(key.rotation), gain)
+        return cls(light_transport, light, light_transport.lobe_scene(light, is_canceled).outgoing, environment)
 
     def shade(
         self,
@@ -89,7 +86,6 @@ class FewLobeRays:
         view: View,
         material: int,
         light: Illumination,
-        patch_light: Illumination,
         document: Mapping[str, Any],
     ) -> Shaped[F32, "n 3"] | None:
         """Return the radiance of samples for a white term; None if its lobe is wide. See `LobeShader`."""
@@ -97,25 +93,33 @@ class FewLobeRays:
         if traced is None:
             return None
         image = self._image_points(view, material)
-        footprint, local_rays = samples.pixel_footprint(receivers), samples.local_rays(light, receivers.points)
-        scene = self.light_transport.lobe_scene(light, lambda: False, self._outgoing(patch_light))
-        light_args = scene, self.environment(light), receivers, footprint
-        rays_per_point = MAX_RAYS / max(int(np.count_nonzero(image.is_first)), 1)
-        ray_args = traced, image, rays_per_point, local_rays
+        footprint, emitters = samples.pixel_footprint(receivers), self.light_transport.lobe_emitters(light)
+        scene = self.light_transport.lobe_scene(light, lambda: False, self.outgoing)
+        light_args = scene, self.environment, receivers, footprint
+        ray_args = traced, image, MAX_RAYS / max(image.num_pixels, 1), emitters
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)
-        cosine = np.einsum("nc,nc->n", receivers.normal, receivers.wo).clip(0, 1)
-        albedo = [np.interp(-cosine, -cosines(), column) for column in traced.albedo[:, 0].T]
-        return np.asarray(np.stack(albedo, axis=1) * radiance, np.float32)
+        args = receivers.normal, receivers.wo, np.ascontiguousarray(traced.albedo[:, 0])
+        parallel_for_chunks(lambda start, stop: _scale_by_albedo(*args, start, stop, radiance), len(radiance))
+        return radiance
 
     def _image_points(self, view: View, material: int) -> ImagePoints:
         """Return the samples of a material as points of their image, cached."""
         transport = self.light_transport
 
         def compute() -> ImagePoints:
-            pixel = view.pixel[view.rows(material)]
-            is_first = np.zeros(len(pixel), np.bool_)
-            is_first[np.unique(pixel, return_index=True)[1]] = True
-            return ImagePoints(pixel, is_first, (view.width, view.height))
+            pixel = view.pixel[view.rows(material)].astype(np.int32)
+            return ImagePoints.from_pixels(pixel, (view.width, view.height))
 
         key = transport.key, *view.sample_key(material), "points of the image"
         return transport.cache.transient.get_value(key, compute)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _scale_by_albedo(normal, wo, albedo, start, stop, radiance):  # type: ignore[no-untyped-def]
+    """Multiply L̄ of samples [start, stop) by the directional albedo, in place. albedo: over θo. (rows, 3)"""
+    for p in range(start, stop):
+        cosine = normal[p, 0] * wo[p, 0] + normal[p, 1] * wo[p, 1] + normal[p, 2] * wo[p, 2]
+        row, fraction = table_row(min(max(cosine, MIN_COSINE), np.float32(1)))
+        for channel in range(3):
+            lower, upper = albedo[row, channel], albedo[row + 1, channel]
+            radiance[p, channel] *= lower + fraction * (upper - lower)

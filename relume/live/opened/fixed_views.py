@@ -28,6 +28,7 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination, emission_images
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
+from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.opened.few_lobe_rays import FewLobeRays
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import (
@@ -51,6 +52,7 @@ from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import SampleSplitter
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete, validate
 from relume.look.glass import GlassOfLook, glass_of
+from relume.look.model import Rgb
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
@@ -329,10 +331,13 @@ class BakedFixedViews:
             geometry, normals=normals, tangents=np.zeros((num, 4), np.float32), uvs=np.zeros((num, 2), np.float32)
         )
 
-    @cached_property
-    def few_lobe_rays(self) -> FewLobeRays:
-        """Images of narrow terms by few rays a sample."""
-        return FewLobeRays(self)
+    def few_lobe_rays(self, light: Illumination, is_canceled: Callable[[], bool]) -> FewLobeRays:
+        """Prepare images of narrow terms by few rays a sample. See `FixedViewTransfer`."""
+        return FewLobeRays.prepare(self, light, is_canceled)
+
+    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
+        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+        return self.local.lobe_emitters(light)
 
     def lobe_scene(
         self,

@@ -23,6 +23,7 @@ from relume.live.free_camera.free_view import FreeView
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight, hard_shadow_lights, local_shadow_targets
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
+from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.free_camera.occluded_probes import find_occluded_probes
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.live.free_camera.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
@@ -33,6 +34,7 @@ from relume.live.opened.stored_patches import read_patches
 from relume.live.opened.sun_extraction import SunExtractor
 from relume.look import EnvironmentKey, LightGeometry
 from relume.look.glass import GlassOfLook
+from relume.look.model import Rgb
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
 from relume.methods.mirror_lights import read_mirror_lights
 from relume.methods.store_layout import read_free_camera_error
@@ -47,7 +49,7 @@ from relume.transport.direction_bins import DirectionBins, outgoing_bins
 from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
-from relume.transport.shading_points import GatherRays, LocalRays, RayList
+from relume.transport.shading_points import GatherRays, RayList
 from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
@@ -390,9 +392,9 @@ class BakedFreeCamera:
         """Return the surfaces that lobe rays meet, with their light. See `FreeCameraTransfer`."""
         return self.light_transport.lobe_scene(light, is_canceled)
 
-    def lobe_local_rays(self, light: Illumination, points: SurfacePoints) -> Sequence[LocalRays]:
-        """Return the rays of local lights to points, few for each light. light: the illumination"""
-        return self.light_transport.local.rays_to(light, points, is_coarse=True)
+    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
+        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+        return self.light_transport.lobe_emitters(light)
 
     def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
         """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""

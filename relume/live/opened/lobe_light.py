@@ -18,8 +18,7 @@ from relume.assets.environments.equirect import (
     texel_solid_angles,
 )
 from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
-from relume.brdf.lobe_sampling import LobeSampling, sample_lobe
-from relume.brdf.roughness_levels import NO_LEVELS
+from relume.brdf.lobe_sampling import LobeSampling, lobe_of
 from relume.brdf.texture_slots import TEXTURES, EmissionImage
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.lights.sphere_tiles import Tiles
@@ -238,10 +237,9 @@ def _albedo_by_cosine(documents: Documents) -> Shaped[NDArray[np.float64], "step
     return np.stack([np.interp(cosine, np.cos(theta_o)[::-1], column[::-1]) for column in values.T], axis=1)
 
 
-@lru_cache(maxsize=64)
 def _narrow_lobe(reflectance: Reflectance) -> tuple[LobeSampling, Documents] | None:
     """Return the first lobe of a material whose narrow highlights are strong, and their terms; None for others."""
-    lobes = ((document, sample_lobe(document, NO_LEVELS)) for document in reflectance.lobes)
+    lobes = ((document, lobe_of(document)) for document in reflectance.lobes)
     # tangents are unknown at hits
     narrow = [(document, lobe) for document, lobe in lobes if lobe is not None and lobe.is_round]
     documents = tuple(document for document, _ in narrow)

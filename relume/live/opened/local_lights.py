@@ -23,7 +23,9 @@ from relume.lights.local_lights import (
     prepare_local_lights,
 )
 from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.look import LightGeometry
+from relume.look.model import Rgb
 from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.emission_image import ImageEmitter, image_emitter
@@ -38,6 +40,7 @@ F32 = NDArray[np.float32]
 
 SAMPLES = 64  # of a rectangle, per view sample
 MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # mesh lights have more samples, if the scene has few emissive materials
+COARSE_SAMPLES = 16  # that stand for parts of a surface in narrow lobes
 PREVIEW_SAMPLES = 4  # during an edit of the light
 _ONES = np.ones(3, np.float32)
 
@@ -124,6 +127,18 @@ class LocalLights:
             )
             rays.append(LocalRays(*self.sample_light(geometry, num_samples), np.array(gain, np.float32), visible))
         return rays
+
+    def lobe_emitters(self, light: Illumination) -> list[tuple[LobeEmitter, Rgb]]:
+        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+        if not light.paths.direct:
+            return []
+        return [(self._lobe_emitter(geometry), gain) for geometry, gain in light.local]
+
+    def _lobe_emitter(self, geometry: LightGeometry) -> LobeEmitter:
+        return self._cache.transient.get_value(
+            (self._key, "light in lobes", geometry),
+            lambda: LobeEmitter.from_light(*self.sample_light(geometry, COARSE_SAMPLES)),
+        )
 
     def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
         """Preview a light of unit emission at points, with few samples if it has an extent."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -63,13 +62,6 @@ class PrefilteredEnvironments:
         """Order of the light triangles with neighbors in sequence."""
         return np.argsort(self.light_transport.tiles.traversal_key, kind="stable")
 
-    def has_environment_lookup(self, name: str | None) -> bool:
-        """Return whether an environment is blurred and cached."""
-        return self.light_transport.cache.contains(self._lookup_key(name))
-
-    def _lookup_key(self, name: str | None) -> tuple[Hashable, ...]:
-        return self.light_transport.cache_owner(name), "sky", name
-
     def environment_lookup(self, name: str | None) -> EnvironmentLookup:
         """Return an environment, and its blurred versions without bright lights."""
 
@@ -80,7 +72,8 @@ class PrefilteredEnvironments:
                 lambda degrees: prefiltered(downsampled_radiance, degrees),
             )
 
-        return self.light_transport.cache.get_value(self._lookup_key(name), compute)
+        key = self.light_transport.cache_owner(name), "sky", name
+        return self.light_transport.cache.get_value(key, compute)
 
     def bright_lights(self, environment: EnvironmentKey) -> Shaped[F32, "lights 7"]:
         """Return the bright lights of an environment, rotated; see `PrefilteredEnvironment`."""

@@ -18,7 +18,7 @@ from relume.store.run_bake import bake_in_process
 
 CAMERA = make_camera("front", [0.4, 1.2, 3.2], [0, 0.45, 0], 0.7)
 METAL = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.4, "f0": 0.9}}
-ROUGHNESS = "/materials/Ball/terms/0/params/roughness"
+ROUGHNESS, F0 = (f"/materials/Ball/terms/0/params/{name}" for name in ("roughness", "f0"))
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +34,12 @@ def polished(tmp_path_factory):
     return open_transfer(path, Cache(1 << 30))
 
 
-def rough(transfer, roughness):
-    def edit(document):
-        document["materials"]["Ball"]["terms"] = [{**METAL, "params": {"roughness": roughness, "f0": 0.9}}]
+def set_metal(document, roughness, f0=0.9):
+    document["materials"]["Ball"]["terms"] = [{**METAL, "params": {"roughness": roughness, "f0": f0}}]
 
-    return make_look(transfer, edit)
+
+def rough(transfer, roughness):
+    return make_look(transfer, lambda document: set_metal(document, roughness))
 
 
 @pytest.fixture
@@ -94,6 +95,55 @@ def test_every_step_of_a_slow_drag_is_shown(polished, prepared):
         images.append(prepared.image())
     assert (images[0] != images[1]).any()
     assert (images[1] != images[2]).any()
+
+
+def test_only_the_dragged_material_is_drawn_again(polished, prepared):
+    before, (ball, floor) = prepared.image(), masks(polished)
+    for roughness in (0.3, 0.2):
+        prepared.set_look(rough(polished, roughness), active_pointer=ROUGHNESS)
+        tiles = prepared.advance(None).tiles
+    is_drawn = np.zeros_like(ball)
+    for x, y, width, height in tiles:
+        is_drawn[y : y + height, x : x + width] = True
+    assert is_drawn[ball].all()
+    assert is_drawn.mean() < 0.75
+    np.testing.assert_array_equal(prepared.image()[floor], before[floor])
+    np.testing.assert_allclose(run_until_exact(prepared).image(), exact(polished, 0.2), rtol=1e-4, atol=1e-4)
+
+
+def test_a_dragged_reflectance_is_free_of_noise(polished):
+    picture = Picture(polished, "front", Cache(BUDGET), is_watched=True)
+    picture.set_look(rough(polished, 0.1))
+    run_until_exact(picture)
+    picture.prepare(ROUGHNESS)
+    run_until_exact(picture)
+    picture.prepare(F0)
+    run_until_exact(picture)
+    looks = [make_look(polished, lambda document, f0=f0: set_metal(document, 0.1, f0)) for f0 in (0.89, 0.87)]
+    for look in looks:
+        picture.set_look(look, active_pointer=F0)
+        assert picture.advance(None).fidelity == Fidelity.APPROXIMATE
+    shown, ball = picture.image(), masks(polished)[0]
+    expected = run_until_exact(picture).image()
+    # what other surfaces receive from the ball is of before
+    assert np.linalg.norm((shown - expected)[ball]) < 0.02 * np.linalg.norm(expected[ball])
+
+
+def test_preparation_ends_with_a_small_cache(polished):
+    transfer = open_transfer(polished.store.path, Cache(1 << 20))
+    picture = Picture(transfer, "front", Cache(BUDGET), is_watched=True)
+    picture.set_look(rough(transfer, 0.4))
+    run_until_exact(picture)
+    picture.prepare(ROUGHNESS)
+    for _ in range(50):
+        picture.advance(None)
+        job = picture.next_job()
+        if job is None:
+            break
+        job.apply(job.run(lambda share: None, lambda: False))
+    assert job is None
+    picture.set_look(rough(transfer, 0.1), active_pointer=ROUGHNESS)
+    assert picture.advance(None).fidelity == Fidelity.APPROXIMATE
 
 
 def test_fewer_bounces_are_not_answered_by_the_earlier_light(polished, prepared):

@@ -4,17 +4,21 @@ import copy
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
 from relume.brdf.albedo import directional_albedo
 from relume.core.cache import Cache
+from relume.live.free_camera import shade_lobe_rays, shared_lobe_rays
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.lobe_terms import split_terms
+from relume.live.free_camera.static_view_jobs import StaticViewState, residual_job
 from relume.live.opened.openers import open_bake
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import complete, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
-from relume.scene.model import Material
+from relume.scene.model import Glass, Material
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 
@@ -96,6 +100,38 @@ def test_direct_light_alone_leaves_the_floor_out(white):
     assert np.sqrt(np.mean((moving - exact)[is_ball] ** 2)) < 0.1 * np.sqrt(np.mean(exact[is_ball] ** 2))
 
 
+@pytest.mark.parametrize("roughness", [0.05, 0.1])  # partly a mirror of the exact image, and a lobe alone
+def test_the_residual_leaves_indirect_light_in_a_polished_surface(white, roughness):
+    bake, builder = white
+    size = 20 * SIZE[0], 20 * SIZE[1]
+    picture = FreeCameraPicture(bake, "front", is_watched=True)
+    picture.set_camera(CAMERA, size)
+
+    def edit(document):
+        document["materials"]["Ball"]["terms"][0]["params"]["roughness"] = roughness
+
+    look = look_with(bake, edit)
+    picture.set_look(look)
+    picture.advance(None)
+    while (job := picture.next_job()) is not None and job.key[0] != "highlights":
+        job.apply(job.run(lambda share: None, lambda: False))
+        picture.advance(None)
+    before = picture.image()
+    view_state = StaticViewState(builder.make_static_view, bake.cache, (CAMERA, size), look, None)
+    applied = []
+    job = residual_job(view_state, copy.copy(picture), (0, 0), applied.append)
+    job.apply(job.run(lambda share: None, lambda: False))
+    is_chrome = picture.stored_scene.face_material[np.maximum(picture.gbuffer.hits.face, 0)] == 0
+    is_chrome &= picture.gbuffer.hits.face >= 0
+    pixels = before.reshape(-1, 3)[is_chrome[: size[0] * size[1]]]
+    residual = np.zeros_like(before) if applied[0] is None else applied[0]
+    assert abs(residual.reshape(-1, 3)[is_chrome[: size[0] * size[1]]]).mean() < 0.02 * pixels.mean()
+    # the picture itself keeps the light of the floor
+    picture.set_camera(CAMERA, size)
+    picture.advance(None)
+    np.testing.assert_allclose(picture.image(), before, rtol=1e-5, atol=1e-5)
+
+
 @pytest.mark.parametrize("roughness", [0.01, 0.05, 0.2])
 def test_the_highlight_of_a_sun_has_its_energy(sunny, roughness):
     bake, builder = sunny
@@ -111,3 +147,53 @@ def test_the_highlight_of_a_sun_has_its_energy(sunny, roughness):
     sun = exact - np.minimum(exact, 1)
     assert sun.mean() > 0.02 * exact.mean()
     assert abs(moving.mean() / exact.mean() - 1) < 0.03
+
+
+def test_a_piece_without_rays_nearby_is_not_black(white, monkeypatch):
+    bake, _ = white
+    monkeypatch.setattr(shade_lobe_rays, "MAX_RAYS", 1)
+    monkeypatch.setattr(shared_lobe_rays, "_LEAST_POINTS", 1)
+    look = look_with(bake, lambda document: None)
+    is_ball = ball_of(bake, look).repeat(8, axis=0).repeat(8, axis=1)
+    assert (show(bake, look, finer=8)[binary_erosion(is_ball, iterations=8)].max(axis=1) > 0.05).all()
+
+
+def test_each_block_of_pixels_has_a_point_with_rays():
+    pixel = np.random.default_rng(4).choice(100 * 70, 60, replace=False).astype(np.int32)
+    twice = np.concatenate([pixel, pixel[::-1]])
+    image = shared_lobe_rays.ImagePoints.from_pixels(twice, (100, 70))
+    assert image.num_pixels == 60
+    assert (image.order[60:] == 2).all()
+    y, x = np.divmod(pixel, 100)
+    for block in set(zip(x // 16, y // 16, strict=True)):
+        is_inside = (x // 16 == block[0]) & (y // 16 == block[1])
+        assert image.order[:60][is_inside].min() == 0
+
+
+def test_rays_of_glass_are_bounded_and_shared(tmp_path, monkeypatch):
+    ball = sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24)
+    floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 1)
+    materials = [Material("Ball", (CHROME,), glass=Glass()), Material("Floor", (RED,))]
+    environment = np.ones((16, 32, 3), np.float32)
+    scene = make_tiny_scene(ball, floor, camera=CAMERA, environment=environment, materials=materials)
+    recipe = Recipe("probes", ("front",), SIZE, 200, num_probes=2000)
+    bake = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
+    num_traced, trace = [], shared_lobe_rays.mean_lobe_radiance
+
+    def count(scene, environment, receivers, *args, **options):
+        num_traced.append(receivers.points.num_points)
+        return trace(scene, environment, receivers, *args, **options)
+
+    monkeypatch.setattr(shared_lobe_rays, "mean_lobe_radiance", count)
+    monkeypatch.setattr(shade_lobe_rays, "MAX_RAYS", 2000)
+    picture = FreeCameraPicture(bake, "front")
+    picture.set_camera(CAMERA, (4 * SIZE[0], 4 * SIZE[1]))
+    picture.set_look(look_with(bake, lambda document: None))
+    picture.advance(None)
+    few = picture.image()
+    assert 0 < num_traced[0] < 2500
+    monkeypatch.setattr(shade_lobe_rays, "MAX_RAYS", 10**6)
+    picture.set_camera(CAMERA, (4 * SIZE[0], 4 * SIZE[1]))
+    picture.advance(None)
+    many = picture.image()
+    assert np.sqrt(np.mean((few - many) ** 2)) < 0.1 * np.sqrt(np.mean(many**2))

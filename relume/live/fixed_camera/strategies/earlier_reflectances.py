@@ -15,10 +15,12 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import max_albedo_change
+from relume.brdf.lobe_sampling import lobe_curves
+from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, equal_up_to_reflectances
-from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback, ignore_result
-from relume.live.fixed_camera.protocols import LightQuality
+from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
+from relume.live.fixed_camera.protocols import LightQuality, LobeShader
 from relume.live.fixed_camera.strategies import operator
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget
@@ -33,7 +35,7 @@ def _is_ready(target: TermTarget, light: Illumination) -> bool:
     if reference is None or reference.light is None or not _is_similar(reference.light, light):
         return False
     changed = set(reference.changed_curves(live.target_bands))
-    if not changed or _traces_lobe(target, reference.light):
+    if not changed or _lobe_shader(target, reference) is not None:
         return True
     basis = reference.basis
     if basis is None or not basis.is_valid_for(live.document) or not changed <= set(basis.affected_curves):
@@ -56,11 +58,13 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     images, material, live = target
     reference = live.ready.reference
     assert reference is not None
-    assert reference.light is not None
     state = replace(live.ready, fidelity=Fidelity.APPROXIMATE, light=light)
-    if reference.changed_curves(live.target_bands) and _traces_lobe(target, reference.light):
-        image = _trace_lobe(target, light, reference.light)
+    if (shader := _lobe_shader(target, reference)) is not None:
+        image = _trace_lobe(target, light, shader)
         live.set_ready(replace(state, image=image, bands=live.target_bands, traces_lobe=True))
+        return
+    if live.keeps_showing(reference):
+        live.keep_image(light)
         return
     steps = images.operator(material, live, reference)
     if steps is not None:
@@ -69,21 +73,24 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     live.set_ready(replace(state, bands=reference.bands, reference=reference, traces_lobe=reference.traces_lobe))
 
 
-def _traces_lobe(target: TermTarget, light: Illumination) -> bool:
-    """Return whether few rays along the narrow lobe of a term show it: an operator would show noise."""
-    live, shader = target.live, target.images.transfer.few_lobe_rays
-    is_round = live.lobe is not None and live.lobe.is_round
-    return is_round and not live.levels.pairs and shader.is_prepared(light)
+def _lobe_shader(target: TermTarget, reference: DisplayedImage) -> LobeShader | None:
+    """Return what shows a term by few rays along its narrow lobe; None if an operator shows it without noise."""
+    live, shader = target.live, target.images.lobe_shader
+    shapes_lobe = {curve.name for curve in lobe_curves(live.document)}
+    if shader is None or shader.light != reference.light or live.levels.pairs:
+        return None
+    is_shaped = not shapes_lobe.isdisjoint(reference.changed_curves(live.target_bands))
+    return shader if is_shaped and live.lobe is not None and live.lobe.is_round else None
 
 
 def _trace_lobe(
-    target: TermTarget, light: Illumination, patch_light: Illumination
+    target: TermTarget, light: Illumination, shader: LobeShader
 ) -> Shaped[NDArray[np.float32], "tiles 3 samples"]:
-    """Return the image of a narrow term by few rays a sample. patch_light: whose light of patches is known"""
+    """Return the image of a narrow term by few rays a sample."""
     images, material, live = target
     samples = images.transfer.samples(images.view, material.index, images.cache)
     sample_args = samples, images.unlit_samples(material), images.view, material.index
-    rows = images.transfer.few_lobe_rays.shade(*sample_args, light, patch_light, live.document)
+    rows = shader.shade(*sample_args, light, live.document)
     assert rows is not None  # its lobe is narrow
     if live.view_factor is not None:
         rows /= np.maximum(live.view_factor.T, np.float32(1e-6))
@@ -92,19 +99,24 @@ def _trace_lobe(
 
 def _preparation_job(situation: Situation) -> Job | None:
     """Return the job that prepares lobe rays if the edited control changes the width of a lobe."""
-    prepared, shader = situation.control.prepared_control, situation.images.transfer.few_lobe_rays
-    light = situation.images.light
-    if prepared is None or prepared.basis is None or not light.paths.has_indirect or shader.is_prepared(light):
+    prepared, images = situation.control.prepared_control, situation.images
+    light, shader = images.light, images.lobe_shader
+    if prepared is None or prepared.basis is None or not light.paths.has_indirect:
         return None
-    if not prepared.target.live.changes_lobe(prepared.basis):
+    live, is_prepared = prepared.target.live, shader is not None and shader.light == light
+    # during a drag, the light of its beginning is needed
+    if is_prepared or not live.is_converged or live.ready.light != light or not live.changes_lobe(prepared.basis):
         return None
-    key = "lobe rays", situation.images.transfer.key, light
+
+    def apply(shader: LobeShader) -> None:
+        images.lobe_shader = shader
+
     return Job(
-        key,
+        ("lobe rays", images.transfer.key, light),
         f"{prepared.target.name}, reflections",
         Priority.CONTROL,
-        lambda progress, is_canceled: shader.prepare(light, is_canceled),
-        ignore_result,
+        lambda progress, is_canceled: images.transfer.few_lobe_rays(light, is_canceled),
+        apply,
         state="precomputing",
     )
 
