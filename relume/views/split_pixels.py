@@ -10,12 +10,13 @@ which one point with a linear footprint misses where the surface bends or ends w
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from relume.raytrace.barycentric import FacePoints
 from relume.raytrace.camera_rays import camera_directions, trace_rays
@@ -26,10 +27,15 @@ from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 
-_REACH = 3  # pixels across, within which the contrast is found
 _LEAST_CONTRAST = 3.0  # by the mean radiance
 _SIDES = 8, 4  # points along each side of a pixel: with the strongest contrast, and with others
-_MAX_STRONG, _MAX_WEAK = 1024, 3072  # samples: 114,688 points
+
+
+class SplitLimits(NamedTuple):
+    """Largest numbers of samples that are split: with the strongest contrast, and others."""
+
+    num_strong: int
+    num_weak: int
 
 
 class PixelPoints(NamedTuple):
@@ -43,30 +49,68 @@ class PixelPoints(NamedTuple):
     points: SurfacePoints
     wo: Shaped[F32, "points 3"]
 
+    @property
+    def first(self) -> Shaped[NDArray[np.intp], " samples"]:
+        """Begin of the points of each sample that has any."""
+        return np.flatnonzero(np.diff(self.sample, prepend=-1))
+
+    def average(self, of_points: Shaped[F32, "points 3"], out: Shaped[F32, "n 3"]) -> None:
+        """Replace values of samples by the mean over their points. out: of all samples"""
+        first = self.first
+        if len(first):
+            counts = np.diff(first, append=len(of_points))[:, None]
+            out[self.sample[first]] = np.add.reduceat(of_points, first, axis=0) / counts
+
 
 def choose_splits(
-    pixel: Shaped[NDArray[np.integer], " n"], size: tuple[int, int], radiance: Shaped[F32, "n 3"]
+    pixel: Shaped[NDArray[np.integer], " n"],
+    size: tuple[int, int],
+    radiance: Shaped[F32, "n 3"],
+    limits: SplitLimits,
 ) -> tuple[Shaped[NDArray[np.intp], " k"], Shaped[NDArray[np.intp], " k"]]:
-    """Choose the samples whose radiance may vary most within a pixel, by its contrast to pixels nearby.
+    """Choose the samples whose radiance may vary most within a pixel, by its contrast to neighboring pixels.
 
     Args:
         pixel: of each sample of one material. size: of the image, pixels. radiance: of one term at each.
+        limits: numbers of samples.
     Returns:
         Their rows, ascending; and the number of points along a side of the pixel of each.
     """
     value = radiance.sum(axis=1)
-    brightest, darkest = (np.full(size[0] * size[1], limit, np.float32) for limit in (-np.inf, np.inf))
-    np.maximum.at(brightest, pixel, value)
-    np.minimum.at(darkest, pixel, value)
-    high, low = (
-        extreme(values.reshape(size[::-1]), _REACH, mode="nearest").ravel()[pixel]
-        for extreme, values in ((maximum_filter, brightest), (minimum_filter, darkest))
-    )
-    contrast = high - low
+    extremes = np.full((size[1], size[0], 2), [-np.inf, np.inf], np.float32)
+    contrast = np.empty(len(value), np.float32)
+    _find_contrast(pixel, value, extremes, contrast)
     strong = np.flatnonzero(contrast > _LEAST_CONTRAST * value.mean(dtype=np.float64))
-    strong = strong[np.argsort(-contrast[strong], kind="stable")][: _MAX_STRONG + _MAX_WEAK]
+    strong = strong[np.argsort(-contrast[strong], kind="stable")][: limits.num_strong + limits.num_weak]
     order = np.argsort(strong)
-    return strong[order], np.where(np.arange(len(strong)) < _MAX_STRONG, *_SIDES)[order]
+    return strong[order], np.where(np.arange(len(strong)) < limits.num_strong, *_SIDES)[order]
+
+
+@nb.njit(nogil=True, cache=True)
+def _find_contrast(pixel, value, extremes, contrast):  # type: ignore[no-untyped-def]
+    """Write the difference of the extremes of values in 3 × 3 pixels about each sample.
+
+    Args:
+        pixel, value: of each sample. extremes: largest and smallest value of each pixel, written. (height, width, 2)
+    """
+    height, width, _ = extremes.shape
+    for p in range(pixel.shape[0]):
+        cell = extremes[pixel[p] // width, pixel[p] % width]
+        cell[0], cell[1] = max(cell[0], value[p]), min(cell[1], value[p])
+    for p in range(pixel.shape[0]):
+        y, x, high, low = pixel[p] // width, pixel[p] % width, value[p], value[p]
+        for row in range(max(y - 1, 0), min(y + 2, height)):
+            for column in range(max(x - 1, 0), min(x + 2, width)):
+                high, low = max(high, extremes[row, column, 0]), min(low, extremes[row, column, 1])
+        contrast[p] = high - low
+
+
+def with_normals(geometry: SceneBuffers, normals: Shaped[F32, "corners 3"]) -> SceneBuffers:
+    """Return triangles with the normals of their corners, without tangents and textures."""
+    num = len(normals)
+    return replace(
+        geometry, normals=normals, tangents=np.zeros((num, 4), np.float32), uvs=np.zeros((num, 2), np.float32)
+    )
 
 
 def points_in_pixels(

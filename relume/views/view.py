@@ -38,6 +38,7 @@ from relume.views.store_io import (
     read_ray_origins,
     read_roughness_levels,
     read_seeds,
+    read_shortest_normals,
     read_surface_points,
     read_uv,
     view_directions,
@@ -136,6 +137,10 @@ class View:
     def _reach(self) -> int:
         """Pixels to each side of its own that a sample contributes to."""
         return 0 if self.frost is None else REACH
+
+    def has_normal_map(self, material: int) -> bool:
+        """True if a material's normals are of a map, the scene's or a look's."""
+        return any(self.maps[material : material + 1]) or read_shortest_normals(self.store)[material] < 1
 
     def roughness_levels(self, material: int) -> RoughnessLevels:
         """Roughness levels of a material's samples."""

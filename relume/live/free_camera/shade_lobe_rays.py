@@ -25,7 +25,7 @@ from relume.live.free_camera.normal_mapping import normalize
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.shade_pixels import blend, interpolate_uv, perturbed_normal, texture_footprint
-from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
+from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, PixelSource, lobe_radiance
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.surface_textures import NORMAL_MAP
@@ -147,7 +147,10 @@ def add_lobe_rays(
     for k in np.unique(material[found]):
         index = found[material[found] == k]
         rows = index if rays is None else rays[index]
-        _add_lobe(*scene_args, lobes[k], MAX_RAYS / len(found), rows, ImagePoints.from_pixels(pixel[rows], size), out)
+        is_mapped = stored_scene.textures.material_textures[k, NORMAL_MAP] >= 0
+        source = None if is_mapped or not size[0] else PixelSource(camera, int(k))
+        image = ImagePoints.from_pixels(pixel[rows], size, source)
+        _add_lobe(*scene_args, lobes[k], MAX_RAYS / len(found), rows, image, out)
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)

@@ -22,9 +22,12 @@ from relume.live.free_camera.lobe_radiance import mean_lobe_radiance
 from relume.live.free_camera.lobe_terms import TracedLobe
 from relume.look.model import Rgb
 from relume.raytrace.lobe_directions import make_lobe_pattern
-from relume.transport.lobe_hits import half_vector_spread
+from relume.raytrace.tangents import project_to_tangent
+from relume.scene.model import Camera
+from relume.transport.lobe_hits import NO_FOOTPRINT, half_vector_spread
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.shading_points import ShadingPoints
+from relume.views.split_pixels import PixelPoints, SplitLimits, choose_splits, points_in_pixels, with_normals
 
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
@@ -34,6 +37,8 @@ MAX_RAYS = 60_000
 
 _MOST_RAYS = 8  # of a point
 _SEED = 1
+_NO_VISIBILITY = np.empty((0, 0), np.uint8)
+_SPLITS = SplitLimits(128, 384)  # points whose highlights are averaged over their pixels
 _STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads points evenly
 _REACH, _MAX_REACH = 2, 32  # pixels from which rays are shared, and where there are none nearer
 _BLOCK = 16  # pixels along each side: the first point in each block has rays, so that small pieces have some in reach
@@ -46,6 +51,13 @@ _NEVER = np.float32(2)
 _LEAST_WEIGHTS = (1e-3 / (1 + np.arange(2 * _MAX_REACH**2 + 1) ** 3.0)).astype(np.float32)
 
 
+class PixelSource(NamedTuple):
+    """A material that a camera sees directly."""
+
+    camera: Camera
+    material: int
+
+
 class ImagePoints(NamedTuple):
     """Points in an image.
 
@@ -54,19 +66,25 @@ class ImagePoints(NamedTuple):
         order: in [0, 1]; points whose order is below the share of points that time allows have rays. 2 for all but one
             point of a pixel.
         size: of the image, pixels; a width of 0 if the points are not neighbors: then all have rays.
+        source: what is in the pixels, to average highlights over them; None: they are not.
     """
 
     pixel: Shaped[I32, " n"]
     order: Shaped[F32, " n"]
     size: tuple[int, int]
+    source: PixelSource | None
 
     @classmethod
-    def from_pixels(cls, pixel: Shaped[I32, " n"], size: tuple[int, int]) -> Self:
-        """Order points so that those with rays are spread evenly, whatever their number. pixel, size: as above"""
+    def from_pixels(cls, pixel: Shaped[I32, " n"], size: tuple[int, int], source: PixelSource | None) -> Self:
+        """Order points so that those with rays are spread evenly, whatever their number.
+
+        Args:
+            pixel, size, source: as above.
+        """
         order = np.zeros(len(pixel), np.float32)
         if size[0] > 0:
             _spread(pixel, *size, order)
-        return cls(pixel, order, size)
+        return cls(pixel, order, size, source)
 
     @property
     def num_pixels(self) -> int:
@@ -210,5 +228,30 @@ def lobe_radiance(
     if is_image:
         radiance = _share_with_neighbors(radiance, rows, image, receivers, footprint, lobe_width)
     if is_direct:
-        add_direct_lights(*light_args, receivers, footprint, pattern, emitters, radiance)
+        direct = np.zeros_like(radiance)
+        emitter_args = pattern, emitters
+        add_direct_lights(*light_args, receivers, footprint, *emitter_args, direct)
+        if image.source is not None and len(scene.surfaces.normals):
+            split = _split_points(scene, receivers, image, image.source, direct)
+            of_points, points = np.zeros_like(split.wo), ShadingPoints(split.points, split.wo, _NO_VISIBILITY)
+            add_direct_lights(*light_args, points, NO_FOOTPRINT, *emitter_args, of_points)
+            split.average(of_points, direct)
+        radiance += direct
     return radiance
+
+
+def _split_points(
+    scene: LobeScene, receivers: ShadingPoints, image: ImagePoints, source: PixelSource, direct: Shaped[F32, "n 3"]
+) -> PixelPoints:
+    """Return points all over the pixels in which highlights may vary most, with the rows that they are of.
+
+    Args:
+        scene, receivers, image: as in `lobe_radiance`. source: of `image`. direct: light of the highlights.
+    """
+    rows, side = choose_splits(image.pixel, image.size, direct, _SPLITS)
+    geometry = with_normals(scene.geometry, scene.surfaces.normals)
+    pixel = image.pixel[rows].astype(np.int64)
+    found = points_in_pixels(geometry, source.camera, image.size, pixel, side, source.material)
+    sample = rows[found.sample]
+    tangent = project_to_tangent(receivers.tangent[sample], found.points.normal)
+    return PixelPoints(sample, found.points._replace(tangent=tangent), found.wo)

@@ -21,7 +21,7 @@ from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.free_camera.lobe_terms import split_terms
-from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, lobe_radiance
+from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, PixelSource, lobe_radiance
 from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
 from relume.look.model import Rgb
 from relume.transport.lobe_scene import LobeScene
@@ -108,7 +108,8 @@ class FewLobeRays:
 
         def compute() -> ImagePoints:
             pixel = view.pixel[view.rows(material)].astype(np.int32)
-            return ImagePoints.from_pixels(pixel, (view.width, view.height))
+            source = None if view.has_normal_map(material) else PixelSource(view.camera, material)
+            return ImagePoints.from_pixels(pixel, (view.width, view.height), source)
 
         key = transport.key, *view.sample_key(material), "points of the image"
         return transport.cache.transient.get_value(key, compute)

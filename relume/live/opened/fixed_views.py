@@ -67,6 +67,7 @@ from relume.transport.shading_points import GatherRays, RayList, ShadingPoints
 from relume.transport.split_light import SplitLight
 from relume.views.downsampled import DownsampledStore
 from relume.views.frost_filter import GLOW_WIDTH, MAX_FROSTED_RATIO, RAY_SPACING
+from relume.views.split_pixels import with_normals
 from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
@@ -325,11 +326,7 @@ class BakedFixedViews:
     @cached_property
     def shaded_geometry(self) -> SceneBuffers:
         """The triangles with the normals of their corners, without tangents and textures; a store may lack them."""
-        geometry, normals = self.tracer.geometry, self.lobe_tracer.normals
-        num = len(normals)
-        return replace(
-            geometry, normals=normals, tangents=np.zeros((num, 4), np.float32), uvs=np.zeros((num, 2), np.float32)
-        )
+        return with_normals(self.tracer.geometry, self.lobe_tracer.normals)
 
     def few_lobe_rays(self, light: Illumination, is_canceled: Callable[[], bool]) -> FewLobeRays:
         """Prepare images of narrow terms by few rays a sample. See `FixedViewTransfer`."""

@@ -20,14 +20,13 @@ from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.samples import SelectedSamples
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.tangents import project_to_tangent
-from relume.store.bake_protocol import StoreReader
 from relume.transport.split_light import SplitLight
-from relume.views.split_pixels import PixelPoints, choose_splits, points_in_pixels
-from relume.views.store_io import read_shortest_normals
+from relume.views.split_pixels import PixelPoints, SplitLimits, choose_splits, points_in_pixels
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
 
+_LIMITS = SplitLimits(1024, 3072)  # 114,688 points
 _PRIMARY = 1e-5  # of the camera's distance from the world's origin, below which a ray starts at it
 
 
@@ -38,8 +37,6 @@ class SplitSource(Protocol):
     def cache(self) -> Cache: ...
     @property
     def key(self) -> str: ...
-    @property
-    def store(self) -> StoreReader: ...
     @property
     def local(self) -> LocalLights: ...
     @property
@@ -85,9 +82,7 @@ class SampleSplitter:
         is_canceled: Callable[[], bool],
     ) -> SplitLight | None:
         """Return the light at samples of a term that are split. See `FixedViewTransfer.split_light`."""
-        normals = view.maps[material : material + 1]
-        is_mapped = any(normals) or read_shortest_normals(self.source.store)[material] < 1
-        if is_mapped or not len(self.source.shaded_geometry.normals):
+        if view.has_normal_map(material) or not len(self.source.shaded_geometry.normals):
             return None
         # one choice for all looks with this lobe: an image and the operators that change it must split the same samples
         shape = digest((lobe.angles, lobe.axes, lobe.quantile.tobytes()))
@@ -98,18 +93,18 @@ class SampleSplitter:
         found = self._points(view, material, rows, side)
         if not len(found.sample):
             return None
-        split, first = np.unique(found.sample, return_index=True)
+        first = found.first
         selected = self.source.selected_samples(view, material, rows, has_indirect=light.paths.has_indirect)
         points = _move(selected, found)
         incident = self.source.incident_light(points, light, LightQuality.PREVIEW, is_canceled, lobe)
-        return SplitLight(rows[split], first, *incident)
+        return SplitLight(rows[found.sample[first]], first, *incident)
 
     def _choose(
         self, view: View, material: int, lobe: LobeSampling, radiance: Shaped[F32, "n 3"]
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Choose samples with narrow lobes that the camera sees directly; see `choose_splits`."""
         samples = view.rows(material)
-        rows, side = choose_splits(view.pixel[samples], (view.width, view.height), radiance)
+        rows, side = choose_splits(view.pixel[samples], (view.width, view.height), radiance, _LIMITS)
         camera = view.camera.to_world[:3, 3].astype(np.float32)
         origins = np.broadcast_to(view.ray_origins(samples), radiance.shape)[rows]
         is_primary = np.abs(origins - camera).max(axis=1, initial=0) <= _PRIMARY * np.abs(camera).max(initial=1)

@@ -13,7 +13,7 @@ from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
-from relume.views.split_pixels import choose_splits
+from relume.views.split_pixels import SplitLimits, choose_splits
 
 SIZE, FINER = (32, 24), 10
 CAMERA = make_camera("front", (0, 0.3, 3), (0, 0, 0), 0.7)
@@ -77,11 +77,12 @@ def test_an_edit_of_f0_keeps_the_glint(coarse):
 
 
 def test_splits_are_where_neighbors_differ_most():
+    pixel, size, limits = np.arange(64 * 48), (64, 48), SplitLimits(9, 100)
     radiance = np.ones((64 * 48, 3), np.float32)
     radiance[10 * 64 + 20] = 500
-    rows, side = choose_splits(np.arange(64 * 48), (64, 48), radiance)
+    rows, side = choose_splits(pixel, size, radiance, limits)
     y, x = np.divmod(rows, 64)
     assert sorted(set(y)) == [9, 10, 11]
     assert sorted(set(x)) == [19, 20, 21]
     assert np.all(side == 8)
-    assert len(choose_splits(np.arange(64 * 48), (64, 48), np.ones_like(radiance))[0]) == 0
+    assert len(choose_splits(pixel, size, np.ones_like(radiance), limits)[0]) == 0
