@@ -40,6 +40,7 @@ from relume.transport.patch_lookup import PatchLookup, allocate_lanes
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 256
+_FEW_RAYS = 8  # of a point: with fewer, ranges are longer, and their memory is allocated less often
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _ROOT_TWO_PI = np.float32(math.sqrt(2 * math.pi))
 _PIXEL_SEED, _ALPHA_SEED = np.uint32(0x5BD1E995), np.uint32(0x1B873593)
@@ -281,7 +282,8 @@ def trace_lobe_rays(
         order = np.argsort(paths.first[:num_paths], kind="stable")
         found[start] = LobePaths._make(array[:num_paths][order] for array in paths)
 
-    parallel_for_cancellable(kernel, num_points, _POINTS_PER_RANGE, lambda _: None, is_canceled, "tracing lobes")
+    num_in_range = _POINTS_PER_RANGE * max(_FEW_RAYS // num_rays, 1)
+    parallel_for_cancellable(kernel, num_points, num_in_range, lambda _: None, is_canceled, "tracing lobes")
     if not found:
         return LobeHits(patch, escapes, texture, no_paths(num_points, num_slots))
     point, *columns = (np.concatenate(arrays) for arrays in zip(*(found[k] for k in sorted(found)), strict=True))
