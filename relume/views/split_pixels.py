@@ -1,4 +1,4 @@
-"""Which pixels show a highlight that varies within them, and the points of the surface there.
+"""Highlights that vary within pixels: choice of the pixels, and points of the surface all over them.
 
 A polished surface that is curved mirrors many directions within one pixel, and a sun may be smaller than that. The
 radiance of such a pixel is the mean over its area A,

@@ -1,4 +1,4 @@
-"""Which materials lobe rays go on from, and with which share of their light."""
+"""Materials from which lobe rays go on, and the share of their light that does not."""
 
 import numpy as np
 import pytest

@@ -66,7 +66,11 @@ def _convolved(alpha2: float, added: float, sin2: F64, cos2: F64) -> F64:
 
 
 def masking(theta: F64, params: Params, power: float = 0.0) -> F64:
-    """G1 cos^p θ, G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; without the tangent, which has a pole."""
+    """G1 cos^p θ, G1 = 2 / (1 + sqrt(1 + α² tan² θ)), eq. 34, Walter 2007; without the tangent, which has a pole.
+
+    Args:
+        theta: angle θ, radians. params: of the term. power: p.
+    """
     alpha2 = roughness_to_alpha(params["roughness"]) ** 2
     cos = np.cos(theta)
     return np.asarray(2.0 * cos ** (1 + power) / (cos + np.sqrt(cos * cos + alpha2 * np.sin(theta) ** 2)))

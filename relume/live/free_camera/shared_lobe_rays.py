@@ -37,7 +37,6 @@ MAX_RAYS = 60_000
 
 _MOST_RAYS = 8  # of a point
 _SEED = 1
-_NO_VISIBILITY = np.empty((0, 0), np.uint8)
 _SPLITS = SplitLimits(128, 384)  # points whose highlights are averaged over their pixels
 _STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads points evenly
 _REACH, _MAX_REACH = 2, 32  # pixels from which rays are shared, and where there are none nearer
@@ -233,7 +232,8 @@ def lobe_radiance(
         add_direct_lights(*light_args, receivers, footprint, *emitter_args, direct)
         if image.source is not None and len(scene.surfaces.normals):
             split = _split_points(scene, receivers, image, image.source, direct)
-            of_points, points = np.zeros_like(split.wo), ShadingPoints(split.points, split.wo, _NO_VISIBILITY)
+            of_points, no_visibility = np.zeros_like(split.wo), np.empty((len(split.wo), 0), np.uint8)
+            points = ShadingPoints(split.points, split.wo, no_visibility)
             add_direct_lights(*light_args, points, NO_FOOTPRINT, *emitter_args, of_points)
             split.average(of_points, direct)
         radiance += direct

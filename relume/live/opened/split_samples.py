@@ -51,7 +51,7 @@ class SplitSource(Protocol):
     def selected_samples(
         self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
     ) -> SelectedSamples:
-        """Select samples of a material."""
+        """See `FixedViewTransfer`."""
         ...
 
     def incident_light(
@@ -62,7 +62,7 @@ class SplitSource(Protocol):
         is_canceled: Callable[[], bool],
         lobe: LobeSampling | None,
     ) -> LightsAndPoints:
-        """Return the incident light at samples."""
+        """See `FixedViewTransfer`."""
         ...
 
 

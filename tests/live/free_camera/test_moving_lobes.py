@@ -161,7 +161,7 @@ def test_a_piece_without_rays_nearby_is_not_black(white, monkeypatch):
 def test_each_block_of_pixels_has_a_point_with_rays():
     pixel = np.random.default_rng(4).choice(100 * 70, 60, replace=False).astype(np.int32)
     twice = np.concatenate([pixel, pixel[::-1]])
-    image = shared_lobe_rays.ImagePoints.from_pixels(twice, (100, 70))
+    image = shared_lobe_rays.ImagePoints.from_pixels(twice, (100, 70), None)
     assert image.num_pixels == 60
     assert (image.order[60:] == 2).all()
     y, x = np.divmod(pixel, 100)
