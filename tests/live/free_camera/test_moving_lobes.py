@@ -197,3 +197,15 @@ def test_rays_of_glass_are_bounded_and_shared(tmp_path, monkeypatch):
     picture.advance(None)
     many = picture.image()
     assert np.sqrt(np.mean((few - many) ** 2)) < 0.1 * np.sqrt(np.mean(many**2))
+
+
+def test_a_glint_smaller_than_a_pixel_is_the_mean_over_it(sunny):
+    bake, _ = sunny
+
+    def edit(document):
+        document["materials"]["Ball"]["terms"][0]["params"]["roughness"] = 0.03
+
+    look = look_with(bake, edit)
+    shown, finer = show(bake, look).astype(float), show(bake, look, finer=8).astype(float)
+    expected = finer.reshape(SIZE[1], 8, SIZE[0], 8, 3).mean(axis=(1, 3))
+    assert np.linalg.norm(shown - expected) < 0.3 * np.linalg.norm(expected)  # 0.94 with the middle of each pixel
