@@ -268,7 +268,7 @@ def average_split_samples(transfer, view: View, index, look, lobe, level_rows, i
     light = light._replace(environment_gain=look.environment.gain)
     radiance = np.zeros((view.rows(index).stop - view.rows(index).start, 3), np.float32)
     radiance[level_rows] = image
-    split = transfer.split_light(view, index, light, lobe, radiance, lambda: False)
+    split = transfer.split_light(view, index, light, lobe, lambda: radiance, lambda: False)
     if split is None:
         return image
     ends, image = np.append(split.first, split.points.points.num_points), image.copy()

@@ -29,8 +29,9 @@ Wrap = tuple[str, str]
 _REFINED = ((1024, 16), (4096, 2))
 _MAX_DIFFERENCE = 0.1  # of two colors at one texel, linear
 _MAX_CONFLICTS = 0.01  # share of texels at which triangles differ
+_MAX_COVERS = 64.0  # bounding boxes of triangles, by the image
 _MARGIN = 1.5  # texels around a triangle that lookups at its edges can reach
-_MAX_BLOCK_TEXELS = 1 << 24  # of all blocks
+_MAX_BLOCK_TEXELS = 1 << 24  # of all blocks; of the image that holds them, twice as many
 _MAX_REDUCTION = 4  # of images, so that blocks fit
 _BLOCK_TEXELS_AT_ONCE = 1 << 20
 
@@ -99,10 +100,10 @@ def draw_textured_colors(
 def _draw_in_place(uvs: F32, colors: F32, size: tuple[int, int], wrap: Wrap) -> TexturedColors | None:
     """Colors at the texture coordinates of the mesh; None if triangles with different colors share texels."""
     extent = np.ptp(uvs.astype(np.float64), axis=1)
-    # a triangle beyond one repeat meets itself
-    if extent.max() > 1 + 1e-6:
-        return None
     height, width = size
+    # a triangle beyond one repeat meets itself; many that cover each other are slow to draw, and share texels
+    if extent.max() > 1 + 1e-6 or extent.prod(axis=1).sum() > _MAX_COVERS:
+        return None
     for max_side, least in _REFINED:
         while max(height, width) <= max_side // 2 and np.median((extent * [width, height]).max(axis=1)) < least:
             height, width = 2 * height, 2 * width
@@ -213,6 +214,8 @@ def _draw_blocks(uvs: F32, colors: F32, size: tuple[int, int]) -> TexturedColors
     whole = np.asarray(sides, np.int64)
     num_texels = whole.prod(axis=1)
     corner, width, height = _pack(whole)
+    if width * height > 2 * _MAX_BLOCK_TEXELS:
+        return None
     image, texel_uvs = np.full((height, width, 4), 255, np.uint8), np.zeros((height, width, 2), np.float32)
     for batch in np.split(
         np.arange(len(uvs)), np.flatnonzero(np.diff(num_texels.cumsum() // _BLOCK_TEXELS_AT_ONCE)) + 1

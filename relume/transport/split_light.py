@@ -30,7 +30,7 @@ class SplitLight(NamedTuple):
 
     def mean(self, values: Shaped[F32, "points 3"]) -> Shaped[F32, "k 3"]:
         """Average values of the points of each sample."""
-        return _means(values, self.first, 0)
+        return group_means(values, self.first, 0)
 
     def averaged(self, at_samples: Columns, at_points: Columns) -> Columns:
         """Return the columns of an operator at samples, with the mean over the points of those that are split.
@@ -44,7 +44,7 @@ class SplitLight(NamedTuple):
             out, (begin, end) = at_samples(start, stop), np.searchsorted(self.rows, [start, stop])
             if begin < end:
                 of_points = at_points(int(ends[begin]), int(ends[end]))
-                out[:, self.rows[begin:end] - start] = _means(of_points, self.first[begin:end] - ends[begin], 1)
+                out[:, self.rows[begin:end] - start] = group_means(of_points, self.first[begin:end] - ends[begin], 1)
             return out
 
         return columns
@@ -53,7 +53,7 @@ class SplitLight(NamedTuple):
 Columns = Callable[[int, int], F32]
 
 
-def _means(values: NDArray[Any], first: NDArray[np.intp], axis: int) -> F32:
+def group_means(values: NDArray[Any], first: NDArray[np.intp], axis: int) -> F32:
     """Average groups of values along an axis. first: begin of each group"""
     counts = np.diff(first, append=values.shape[axis])
     sums = np.add.reduceat(values, first, axis=axis, dtype=np.float64)

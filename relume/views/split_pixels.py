@@ -24,6 +24,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.shading_normals import flip_to_viewer
 from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Camera
+from relume.transport.split_light import group_means
 
 F32 = NDArray[np.float32]
 
@@ -58,8 +59,7 @@ class PixelPoints(NamedTuple):
         """Replace values of samples by the mean over their points. out: of all samples"""
         first = self.first
         if len(first):
-            counts = np.diff(first, append=len(of_points))[:, None]
-            out[self.sample[first]] = np.add.reduceat(of_points, first, axis=0) / counts
+            out[self.sample[first]] = group_means(of_points, first, 0)
 
 
 def choose_splits(

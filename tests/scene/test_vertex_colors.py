@@ -10,6 +10,7 @@ from relume.assets.environments.environment import Environment
 from relume.core.color import srgb_decode
 from relume.raytrace.texture import MipMap
 from relume.scene.model import Scene, Texture, TextureEncoding
+from relume.scene.textured_vertex_colors import draw_textured_colors
 from relume.scene.vertex_colors import WRAP, draw_color_image
 from relume.scene_io.gltf import import_gltf
 from relume.scene_io.obj_ply import import_obj, import_ply
@@ -176,3 +177,16 @@ def test_vertex_colors_of_obj_files_are_used_for_one_object_only(objects: int) -
     (material,), (mesh,) = scene.materials, scene.meshes
     shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(3, np.float32))
     np.testing.assert_allclose(shown, np.eye(3), atol=0.005)
+
+
+def test_thousands_of_triangles_over_a_whole_image_are_refused_at_once() -> None:
+    rng = np.random.default_rng(5)
+    uvs = np.tile(np.array([[[0, 0], [1, 0], [0, 1]]], np.float32), (20_000, 1, 1))
+    colors = rng.random((20_000, 3, 4)).astype(np.float32)
+    assert draw_textured_colors(uvs, colors, (2048, 2048), ("repeat", "repeat")) is None
+
+
+def test_blocks_of_extreme_shapes_are_refused_before_their_image_is_allocated() -> None:
+    wide, tall = np.array([[0, 0], [900, 0], [0, 0.05]]), np.array([[0, 0], [0.05, 0], [0, 900]])
+    colors = np.random.default_rng(6).random((2, 3, 4)).astype(np.float32)
+    assert draw_textured_colors(np.array([wide, tall], np.float32), colors, (64, 64), ("repeat", "repeat")) is None

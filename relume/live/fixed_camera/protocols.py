@@ -324,14 +324,15 @@ class FixedViewTransfer(OpenBake, Protocol):
         material: int,
         light: Illumination,
         lobe: LobeSampling,
-        radiance: Shaped[F32, "n 3"],
+        unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
     ) -> SplitLight | None:
         """Return the light at samples in whose pixels the highlight of a term varies; None if there are none.
 
         Args:
             view, material: whose samples they are. light: the illumination. lobe: of the term, narrow.
-            radiance: of the term at all samples of the material. is_canceled: polled.
+            unsplit: returns the term's radiance at all samples of the material, none of them split; called if no
+                samples were chosen yet for this lobe. is_canceled: polled.
         Raises:
             CancelledError: `is_canceled` returned true.
         """

@@ -217,11 +217,11 @@ class ViewImages:
         material: MaterialImage,
         light: Illumination,
         lobe: LobeSampling,
-        radiance: Shaped[F32, "n 3"],
+        unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
     ) -> SplitLight | None:
         """Return the light at samples of a material that are split. See `FixedViewTransfer.split_light`."""
-        return self.transfer.split_light(self.view, material.index, light, lobe, radiance, is_canceled)
+        return self.transfer.split_light(self.view, material.index, light, lobe, unsplit, is_canceled)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""

@@ -8,8 +8,6 @@ noise: a ray that leaves the scene brings the environment blurred by the core an
 
 from __future__ import annotations
 
-import math
-
 import numba as nb
 import numpy as np
 from jaxtyping import Shaped
@@ -35,11 +33,7 @@ from relume.transport.shading_points import ShadingPoints
 F32 = NDArray[np.float32]
 
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
-_PI = np.float32(math.pi)
-# normals of a pixel at which a bright light is evaluated: most if their spread is larger than light and lobe
-_LEAST_JITTERS, _JITTERS_OF_EQUAL, _MOST_JITTERS = 8, np.float32(16), 64
 _CORE_BLUR, _TAIL_BLUR = np.float32(0.5), np.float32(2)  # of the environment, by the width of the lobe
-_DIRECTION_SEED = np.uint32(0x27D4EB2F)
 _MARGIN = np.float32(1.5)  # around a bright light, which blurred texels exclude
 
 

@@ -201,7 +201,7 @@ def lobe_radiance(
     scene: LobeScene,
     environment: PrefilteredEnvironment,
     receivers: ShadingPoints,
-    footprint: Shaped[F32, "n 2 2 3"],
+    footprint: Shaped[F32, "#n 2 2 3"],
     lobe: TracedLobe,
     image: ImagePoints,
     rays_per_point: float,

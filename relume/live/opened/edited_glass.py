@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relume.core.digest import digest
 from relume.core.errors import CancelledError
@@ -24,6 +25,7 @@ ViewMethod = GatherMethod | DirectMethod
 Transport = TypeVar("Transport", bound=BakedFixedViews)
 
 _RAY_STAGE = 3  # of `gather`
+_ACCELERATION_BYTES = 300  # of a triangle
 _PATCHES_PER_TASK = 256  # at most half a second of work, which bounds the time to cancel
 
 
@@ -47,19 +49,47 @@ def light_through_glass(
     if np.array_equal(masks.rules, light_transport.store.read("alpha_masks/rules")):  # only camera rays differ
         return light_transport
 
-    def trace() -> Transport:
-        store = ExtendedStore(light_transport.store, {"views": []})
-        store.arrays["alpha_masks/rules"] = masks.rules
-        key = f"{light_transport.key}/glass-{digest(masks.rules.tobytes())[:16]}"
-        fields: dict[str, Any] = {"store": store, "key": key, "views": {}}
-        if isinstance(light_transport, BakedIndirectViews):
-            assert isinstance(method, GatherMethod)
-            _trace_patches(method, scene, store, progress, is_canceled)
-            return replace(light_transport, **fields, patches=read_patches(store))
-        return replace(light_transport, **fields)
+    cache, key = light_transport.cache.transient, (light_transport.key, "light through glass", masks.rules.tobytes())
+    traced = cache.get_cached(key, _TracedLight)
+    if traced is None:
+        light = _trace(light_transport, method, scene, masks.rules, progress, is_canceled)
+        own_arrays = light.store.arrays.values() if isinstance(light.store, ExtendedStore) else ()
+        num_bytes = sum(array.nbytes for array in own_arrays) + _ACCELERATION_BYTES * len(light.local.faces)
+        traced = cache.get(key, _TracedLight, num_bytes, lambda: _TracedLight(light, num_bytes))
+    traced_light: Transport = traced.light
+    return traced_light
 
-    cache_key = light_transport.key, "light through edited glass", masks.rules.tobytes()
-    return light_transport.cache.transient.get_value(cache_key, trace)
+
+@dataclass(frozen=True)
+class _TracedLight:
+    """Light through edited glass, an entry of the cache.
+
+    Attributes:
+        num_bytes: memory in use, with that of an acceleration structure, which is built when it is needed.
+    """
+
+    light: Any
+    num_bytes: int
+
+
+def _trace(
+    light_transport: Transport,
+    method: ViewMethod,
+    scene: Scene,
+    rules: NDArray[np.float32],
+    progress: ProgressCallback,
+    is_canceled: CancelCheck,
+) -> Transport:
+    """Return the light of a bake through other glass. rules: of alpha masks; all others as in `light_through_glass`"""
+    store = ExtendedStore(light_transport.store, {"views": []})
+    store.arrays["alpha_masks/rules"] = rules
+    key = f"{light_transport.key}/glass-{digest(rules.tobytes())[:16]}"
+    fields: dict[str, Any] = {"store": store, "key": key, "views": {}}
+    if isinstance(light_transport, BakedIndirectViews):
+        assert isinstance(method, GatherMethod)
+        _trace_patches(method, scene, store, progress, is_canceled)
+        return replace(light_transport, **fields, patches=read_patches(store))
+    return replace(light_transport, **fields)
 
 
 def _trace_patches(

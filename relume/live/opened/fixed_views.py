@@ -317,11 +317,11 @@ class BakedFixedViews:
         material: int,
         light: Illumination,
         lobe: LobeSampling,
-        radiance: Shaped[F32, "n 3"],
+        unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
     ) -> SplitLight | None:
         """Return the light at samples in whose pixels a highlight varies. See `FixedViewTransfer`."""
-        return SampleSplitter(self).light(view, material, light, lobe, radiance, is_canceled)
+        return SampleSplitter(self).light(view, material, light, lobe, unsplit, is_canceled)
 
     @cached_property
     def shaded_geometry(self) -> SceneBuffers:

@@ -209,6 +209,8 @@ class LobeTracer:
         """Normals of the corners; empty for a store that lacks them."""
         try:
             return np.asarray(self._store.read("scene/normals"), np.float32)
+        except ChunkDamagedError:
+            raise
         except StoreError:
             return np.empty((0, 3), np.float32)
 
@@ -218,6 +220,8 @@ class LobeTracer:
         sides = (2 * geometry.face_mesh).astype(np.int32)
         try:
             tree, reach = read_tree(self._store), patch_reach(self._store.read("patches/position"))
+        except ChunkDamagedError:
+            raise
         except StoreError:  # direct light alone
             tree, reach = _no_patches(int(sides.max(initial=0)) + 2), patch_reach(np.empty((0, 1, 3), np.float32))
         return PatchLookup(tree, geometry.face_normals, sides, reach)

@@ -78,7 +78,7 @@ class SampleSplitter:
         material: int,
         light: Illumination,
         lobe: LobeSampling,
-        radiance: Shaped[F32, "n 3"],
+        unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
     ) -> SplitLight | None:
         """Return the light at samples of a term that are split. See `FixedViewTransfer.split_light`."""
@@ -89,7 +89,7 @@ class SampleSplitter:
         gain = light.environment_gain if light.local else (1.0, 1.0, 1.0)
         unit_light = light._replace(reflectances=(), environment_gain=gain)
         key = self.source.key, *view.sample_key(material), "split samples", shape, unit_light
-        rows, side = self.source.cache.get_value(key, lambda: self._choose(view, material, lobe, radiance))
+        rows, side = self.source.cache.get_value(key, lambda: self._choose(view, material, lobe, unsplit()))
         found = self._points(view, material, rows, side)
         if not len(found.sample):
             return None

@@ -13,7 +13,7 @@ import threading
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
-from typing import Self, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from jaxtyping import Shaped
@@ -47,8 +47,41 @@ _SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the st
 _LIGHT_FRACTION = 0.3  # of the progress of a view with edited glass; the rest is the view
 
 
+class _OverBake:
+    """A view traced in memory, which shares light and tracers with its bake.
+
+    Attributes:
+        light_transport: the light of the bake.
+    """
+
+    light_transport: BakedFixedViews
+    edited: ImageFiles
+
+    @property
+    def derived(self) -> ImageFiles:
+        """Images of the default look: bounded like those of other looks, since the number of cameras is not."""
+        return self.edited
+
+    @cached_property
+    def local(self) -> LocalLights:
+        """Local lights of the scene."""
+        return self.light_transport.local
+
+    @cached_property
+    def lobe_tracer(self) -> LobeTracer:
+        """Traces lobe rays."""
+        return self.light_transport.lobe_tracer
+
+
 @dataclass(frozen=True)
-class StaticView(BakedIndirectViews):
+class DirectView(_OverBake, BakedFixedViews):
+    """One view of a bake with direct illumination, traced in memory through edited glass."""
+
+    light_transport: BakedFixedViews
+
+
+@dataclass(frozen=True)
+class StaticView(_OverBake, BakedIndirectViews):
     """One static view over a free-camera bake, opened like a fixed view; shares everything that is not of the view.
 
     Attributes:
@@ -70,29 +103,12 @@ class StaticView(BakedIndirectViews):
             glass: that its camera rays have met.
         """
         view = open_view(store, 0, light_transport.cache, light_transport.key)
-        bake_fields = {
-            bake_field.name: getattr(light_transport, bake_field.name) for bake_field in fields(BakedIndirectViews)
-        }
+        own_fields = {"store": store, "views": {view.name: view}, "glass": glass}
         return cls(
-            **{**bake_fields, "store": store, "views": {view.name: view}, "glass": glass},
+            **{**_bake_fields(light_transport, BakedIndirectViews), **own_fields},
             light_transport=light_transport,
             reflects=reflects,
         )
-
-    @property
-    def derived(self) -> ImageFiles:
-        """Images of the default look: bounded like those of other looks, since the number of cameras is not."""
-        return self.edited
-
-    @cached_property
-    def local(self) -> LocalLights:
-        """Local lights of the scene."""
-        return self.light_transport.local
-
-    @cached_property
-    def lobe_tracer(self) -> LobeTracer:
-        """Traces lobe rays."""
-        return self.light_transport.lobe_tracer
 
     @cached_property
     def indirect(self) -> IndirectSolver:
@@ -226,7 +242,15 @@ class StaticViewBuilder:
         if isinstance(light_transport, BakedIndirectViews):
             return StaticView.from_bake(light_transport, tracing.store, reflects, glass)
         view = open_view(tracing.store, 0, light_transport.cache, light_transport.key)
-        return replace(light_transport, store=tracing.store, views={view.name: view}, glass=glass)
+        own_fields = {"store": tracing.store, "views": {view.name: view}, "glass": glass}
+        return DirectView(
+            **{**_bake_fields(light_transport, BakedFixedViews), **own_fields}, light_transport=light_transport
+        )
+
+
+def _bake_fields(bake: BakedFixedViews, kind: type[BakedFixedViews]) -> dict[str, Any]:
+    """Return the fields of a bake. kind: that declares them"""
+    return {field.name: getattr(bake, field.name) for field in fields(kind)}
 
 
 def _start_tracing(

@@ -211,8 +211,9 @@ class _SceneBuilder:
         if is_uniform(colors):
             return VertexColors((red, green, blue, alpha))
         num_triangles = sum(len(geometries[key].faces) for key in vertex_colors)
-        layout, reason = self._material_reader.texture_layout(material), f"it has more than {MAX_COLORED:,} triangles"
+        reason = f"it has more than {MAX_COLORED:,} triangles"
         if num_triangles <= MAX_COLORED:
+            layout = self._material_reader.texture_layout(material)
             if layout is None:
                 return VertexColors(textured=self._draw_color_image(geometries))
             # variants replace images, and would not know of the colors

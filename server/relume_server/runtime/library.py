@@ -62,7 +62,9 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         return ProgressivePicture(FreeCameraPicture(transfer, view, is_watched=True), make_static_view, memory)
 
     def render(transfer: Any, view: str, look: Any, *, exact: bool = True, **options: Any) -> Any:
-        static_views = static_view_builder(transfer) if exact and needs_tracing(transfer, look) else None
+        # frames of a free camera are shown without tracing, if they need not be exact
+        is_traced = needs_tracing(transfer, look) and (exact or transfer.camera_mode is not CameraMode.FREE)
+        static_views = static_view_builder(transfer) if is_traced else None
         return render_image(transfer, view, look, static_views=static_views, **options)
 
     image_code()  # of the running version: its files may be replaced meanwhile

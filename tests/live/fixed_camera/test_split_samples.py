@@ -1,5 +1,7 @@
 """Highlights smaller than a pixel: their mean over it, in exact images and in edits of other curves."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from session_edits import BUDGET, make_look, run_until_exact
@@ -64,7 +66,11 @@ def test_the_glint_of_a_sun_is_the_mean_over_its_pixels(coarse, fine):
     assert shown.sum() == pytest.approx(expected.sum(), rel=0.05)
 
 
-def test_an_edit_of_f0_keeps_the_glint(coarse):
+@pytest.mark.parametrize("is_reopened", [False, True])
+def test_an_edit_of_f0_keeps_the_glint(coarse, is_reopened):
+    if is_reopened:  # images come from files, and the choice of samples is made anew
+        render_image(coarse, "front", metal(coarse))
+        coarse = open_transfer(Path(coarse.key), Cache(1 << 30))
     picture = Picture(coarse, "front", Cache(BUDGET), is_watched=True)
     picture.set_look(metal(coarse))
     run_until_exact(picture)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.lobe_sampling import LobeSampling
 from relume.brdf.term import Term
+from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
@@ -19,10 +20,11 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.view_images import MERGED_LIGHT_SUFFIX, TermTarget
 from relume.operators.edit_basis import EditBasis, precompute
 from relume.operators.linear_operator import Compression, LinearOperator
-from relume.operators.shade import ShadedTerm
+from relume.operators.shade import shade
 from relume.transport.shading_points import ShadingPoints
 from relume.transport.split_light import SplitLight
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
@@ -77,11 +79,11 @@ class OperatorPrecompute:
         def build_operator() -> LinearOperator:
             lights, receivers = images.incident_light(material, self.light, is_canceled, quality, self.lobe)
 
-            split = self._split_light(is_canceled)
+            split = self._split_light(lights, receivers, is_canceled) if step == 1 else None
 
             def precompute_at(samples: ShadingPoints) -> LinearOperator:
                 args = self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits
-                return precompute(*args, split if samples is receivers else None)
+                return precompute(*args, split)
 
             if step > 1:
                 return precompute_subsampled(images.view, material.index, step, receivers, precompute_at)
@@ -89,13 +91,23 @@ class OperatorPrecompute:
 
         return images.cache.get(self.key, LinearOperator, self.num_bytes, build_operator)
 
-    def _split_light(self, is_canceled: CancelCheck) -> SplitLight | None:
-        """Return the light at the samples that the exact image splits; None for none."""
-        images, material, live = self.target
-        if self.lobe is None or not live.ready.is_converged:
+    def _split_light(
+        self, lights: TriangleLights, receivers: ShadingPoints, is_canceled: CancelCheck
+    ) -> SplitLight | None:
+        """Return the light at the samples that the exact image splits; None for none.
+
+        Args:
+            lights, receivers: incident light at all samples. is_canceled: polled.
+        """
+        if self.lobe is None:
             return None
-        radiance = ShadedTerm(live.ready.image).rows(material.num_samples)
-        return images.split_light(material, self.light, self.lobe, radiance, is_canceled)
+        images, material, _ = self.target
+
+        def unsplit() -> F32:
+            args = self.term, self.bands, lights, receivers, lambda fraction: None, is_canceled
+            return shade(*args).rows(material.num_samples)
+
+        return images.split_light(material, self.light, self.lobe, unsplit, is_canceled)
 
     def apply(self, result: LinearOperator) -> None:
         """Use the operator, only if its fixed curves are still those of the target.

@@ -82,7 +82,8 @@ def _early_region(whole: Shading, candidates: Sequence[TermTarget], region: Tile
     complete image costs no more.
     """
     images, material, live = target = whole.target
-    if region is None or target.is_exact_within(region) or not _allows_partial(live):
+    # samples of a narrow lobe are split by the complete image
+    if region is None or live.lobe is not None or target.is_exact_within(region) or not _allows_partial(live):
         return None
     num_visible = np.count_nonzero(material.lies_in(region))
     if images.is_cached(material, live) or not 0 < num_visible < material.num_samples:

@@ -132,7 +132,7 @@ class Shading:
         images, material, _ = self.target
         if self.lobe is None:
             return rows
-        split = images.split_light(material, light, self.lobe, rows, is_canceled)
+        split = images.split_light(material, light, self.lobe, lambda: rows, is_canceled)
         if split is None:
             return rows
         at_points = shade(self.term, self.bands, split.lights, split.points, lambda fraction: None, is_canceled)
