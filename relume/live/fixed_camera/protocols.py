@@ -326,6 +326,7 @@ class FixedViewTransfer(OpenBake, Protocol):
         lobe: LobeSampling,
         unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
+        patch_light: Illumination | None = None,
     ) -> SplitLight | None:
         """Return the light at samples in whose pixels the highlight of a term varies; None if there are none.
 
@@ -333,6 +334,7 @@ class FixedViewTransfer(OpenBake, Protocol):
             view, material: whose samples they are. light: the illumination. lobe: of the term, narrow.
             unsplit: returns the term's radiance at all samples of the material, none of them split; called if no
                 samples were chosen yet for this lobe. is_canceled: polled.
+            patch_light: as in `incident_light`.
         Raises:
             CancelledError: `is_canceled` returned true.
         """

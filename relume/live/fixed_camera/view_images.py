@@ -219,9 +219,10 @@ class ViewImages:
         lobe: LobeSampling,
         unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
+        patch_light: Illumination | None = None,
     ) -> SplitLight | None:
         """Return the light at samples of a material that are split. See `FixedViewTransfer.split_light`."""
-        return self.transfer.split_light(self.view, material.index, light, lobe, unsplit, is_canceled)
+        return self.transfer.split_light(self.view, material.index, light, lobe, unsplit, is_canceled, patch_light)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""

@@ -319,9 +319,10 @@ class BakedFixedViews:
         lobe: LobeSampling,
         unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
+        patch_light: Illumination | None = None,
     ) -> SplitLight | None:
         """Return the light at samples in whose pixels a highlight varies. See `FixedViewTransfer`."""
-        return SampleSplitter(self).light(view, material, light, lobe, unsplit, is_canceled)
+        return SampleSplitter(self).light(view, material, light, lobe, unsplit, is_canceled, patch_light)
 
     @cached_property
     def shaded_geometry(self) -> SceneBuffers:

@@ -61,6 +61,7 @@ class SplitSource(Protocol):
         quality: LightQuality,
         is_canceled: Callable[[], bool],
         lobe: LobeSampling | None,
+        patch_light: Illumination | None,
     ) -> LightsAndPoints:
         """See `FixedViewTransfer`."""
         ...
@@ -80,6 +81,7 @@ class SampleSplitter:
         lobe: LobeSampling,
         unsplit: Callable[[], Shaped[F32, "n 3"]],
         is_canceled: Callable[[], bool],
+        patch_light: Illumination | None = None,
     ) -> SplitLight | None:
         """Return the light at samples of a term that are split. See `FixedViewTransfer.split_light`."""
         if view.has_normal_map(material) or not len(self.source.shaded_geometry.normals):
@@ -96,7 +98,7 @@ class SampleSplitter:
         first = found.first
         selected = self.source.selected_samples(view, material, rows, has_indirect=light.paths.has_indirect)
         points = _move(selected, found)
-        incident = self.source.incident_light(points, light, LightQuality.PREVIEW, is_canceled, lobe)
+        incident = self.source.incident_light(points, light, LightQuality.PREVIEW, is_canceled, lobe, patch_light)
         return SplitLight(rows[found.sample[first]], first, *incident)
 
     def _choose(

@@ -22,6 +22,7 @@ from relume.live.fixed_camera.illumination import Illumination, equal_up_to_refl
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.protocols import LightQuality, LobeShader
 from relume.live.fixed_camera.strategies import operator
+from relume.live.fixed_camera.strategies.shading import average_split
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.operators.shade import ShadedTerm, shade
@@ -137,11 +138,14 @@ def _more_rays(target: TermTarget, patch_light: Illumination) -> Job:
     """Return the job that shades a term by some rays a sample. patch_light: whose light of patches is known"""
     images, material, live = target
     light, ready, lobe, term, bands = live.light, live.ready, live.lobe, live.term, live.target_bands
+    assert lobe is not None  # few rays were traced along it
 
     def run(progress: ProgressCallback, is_canceled: CancelCheck) -> ShadedTerm:
         light_args = light, is_canceled, LightQuality.EXACT, lobe, patch_light
         incident = images.incident_light(material, *light_args)
-        return shade(term, bands, *incident, progress, is_canceled)
+        rows = shade(term, bands, *incident, progress, is_canceled).rows(material.num_samples)
+        split = images.split_light(material, light, lobe, lambda: rows, is_canceled, patch_light)
+        return ShadedTerm.from_rows(average_split(rows, term, bands, split, is_canceled))
 
     def apply(result: ShadedTerm) -> None:
         if target.exists() and live.ready is ready:

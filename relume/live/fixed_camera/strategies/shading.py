@@ -21,6 +21,7 @@ from relume.live.fixed_camera.strategies.texel_sum import is_cacheable, put_texe
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.look.model import Rgb
 from relume.operators.shade import PartialImage, ShadedTerm, shade, shaded_bytes
+from relume.transport.split_light import SplitLight
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -33,6 +34,26 @@ class LightComponent(NamedTuple):
     key: tuple[Hashable, ...]
     light: Illumination
     gain: Rgb
+
+
+def average_split(
+    rows: Shaped[F32, "n 3"],
+    term: Term,
+    bands: Mapping[str, F64],
+    split: SplitLight | None,
+    is_canceled: CancelCheck,
+) -> Shaped[F32, "n 3"]:
+    """Return an image with the mean over the pixel where the highlight varies within it.
+
+    Args:
+        rows: the image. term, bands: as in `shade`. split: light of the samples that are split. is_canceled: polled.
+    """
+    if split is None:
+        return rows
+    at_points = shade(term, bands, split.lights, split.points, lambda fraction: None, is_canceled)
+    averaged = rows.copy()
+    averaged[split.rows] = split.mean(at_points.rows(split.points.points.num_points))
+    return averaged
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +154,7 @@ class Shading:
         if self.lobe is None:
             return rows
         split = images.split_light(material, light, self.lobe, lambda: rows, is_canceled)
-        if split is None:
-            return rows
-        at_points = shade(self.term, self.bands, split.lights, split.points, lambda fraction: None, is_canceled)
-        averaged = rows.copy()
-        averaged[split.rows] = split.mean(at_points.rows(split.points.points.num_points))
-        return averaged
+        return average_split(rows, self.term, self.bands, split, is_canceled)
 
     def _partial_rows(
         self,
