@@ -16,7 +16,7 @@ only decides where in the band it goes: lobes narrower than a band keep shape an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -61,6 +61,11 @@ class LobeSampling(NamedTuple):
     quantile: Shaped[F32, "rows quantiles"]
     band_density: Shaped[F32, "rows J"]
     median: Shaped[F64, " rows"]
+
+    @property
+    def identity(self) -> tuple[Hashable, ...]:
+        """Equal for equal distributions, for keys and digests."""
+        return self.angles, self.axes, self.quantile.tobytes()
 
     @property
     def is_half_angle(self) -> bool:

@@ -23,6 +23,7 @@ from relume.raytrace.camera_rays import camera_directions, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.shading_normals import flip_to_viewer
 from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import project_to_tangent
 from relume.scene.model import Camera
 from relume.transport.split_light import group_means
 
@@ -43,7 +44,7 @@ class PixelPoints(NamedTuple):
     """Points all over the pixels of some samples.
 
     Attributes:
-        sample: index of the sample of each point, ascending. points: their tangents are zero. wo: view directions.
+        sample: index of the sample of each point, ascending. points: with the samples' tangents. wo: view directions.
     """
 
     sample: Shaped[NDArray[np.intp], " points"]
@@ -106,11 +107,9 @@ def _find_contrast(pixel, value, extremes, contrast):  # type: ignore[no-untyped
 
 
 def with_normals(geometry: SceneBuffers, normals: Shaped[F32, "corners 3"]) -> SceneBuffers:
-    """Return triangles with the normals of their corners, without tangents and textures."""
-    num = len(normals)
-    return replace(
-        geometry, normals=normals, tangents=np.zeros((num, 4), np.float32), uvs=np.zeros((num, 2), np.float32)
-    )
+    """Return triangles with the normals of their corners, without tangents and textures: one zero for all corners."""
+    tangents, uvs = (np.broadcast_to(np.float32(0), (len(normals), size)) for size in (4, 2))
+    return replace(geometry, normals=normals, tangents=tangents, uvs=uvs)
 
 
 def points_in_pixels(
@@ -119,13 +118,15 @@ def points_in_pixels(
     size: tuple[int, int],
     pixel: Shaped[NDArray[np.int64], " k"],
     side: Shaped[NDArray[np.intp], " k"],
+    tangent: Shaped[F32, "k 3"],
     material: int,
 ) -> PixelPoints:
     """Find the points where rays through pixels hit a material.
 
     Args:
         geometry: the triangles, with normals. camera: of the image. size: of the image, pixels.
-        pixel: of each sample. side: number of rays along a side of each one's pixel. material: of the samples.
+        pixel: of each sample. side: number of rays along a side of each one's pixel. tangent: of each sample.
+        material: of the samples.
     """
     sample = np.repeat(np.arange(len(pixel)), side**2)
     number = np.arange(len(sample)) - np.repeat(np.cumsum(side**2) - side**2, side**2)
@@ -138,5 +139,6 @@ def points_in_pixels(
     face_points = FacePoints.from_hits(geometry, hits.rows(found), directions)
     normal = flip_to_viewer(face_points.normal, directions).astype(np.float32)
     seed = np.arange(len(found), dtype=np.uint32)
-    points = SurfacePoints(face_points.position.astype(np.float32), normal, np.zeros_like(normal), seed)
+    tangents = project_to_tangent(tangent[sample[found]], normal)
+    points = SurfacePoints(face_points.position.astype(np.float32), normal, tangents, seed)
     return PixelPoints(sample[found], points, np.negative(directions))

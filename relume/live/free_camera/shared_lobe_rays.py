@@ -22,7 +22,6 @@ from relume.live.free_camera.lobe_radiance import mean_lobe_radiance
 from relume.live.free_camera.lobe_terms import TracedLobe
 from relume.look.model import Rgb
 from relume.raytrace.lobe_directions import make_lobe_pattern
-from relume.raytrace.tangents import project_to_tangent
 from relume.scene.model import Camera
 from relume.transport.lobe_hits import NO_FOOTPRINT, half_vector_spread
 from relume.transport.lobe_scene import LobeScene
@@ -251,7 +250,6 @@ def _split_points(
     rows, side = choose_splits(image.pixel, image.size, direct, _SPLITS)
     geometry = with_normals(scene.geometry, scene.surfaces.normals)
     pixel = image.pixel[rows].astype(np.int64)
-    found = points_in_pixels(geometry, source.camera, image.size, pixel, side, source.material)
-    sample = rows[found.sample]
-    tangent = project_to_tangent(receivers.tangent[sample], found.points.normal)
-    return PixelPoints(sample, found.points._replace(tangent=tangent), found.wo)
+    pixel_args = pixel, side, receivers.tangent[rows], source.material
+    found = points_in_pixels(geometry, source.camera, image.size, *pixel_args)
+    return found._replace(sample=rows[found.sample])

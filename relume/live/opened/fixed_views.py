@@ -49,7 +49,7 @@ from relume.live.opened.lobe_light import (
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
-from relume.live.opened.split_samples import SampleSplitter
+from relume.live.opened.split_samples import split_light
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete, validate
 from relume.look.glass import GlassOfLook, glass_of
 from relume.look.model import Rgb
@@ -301,7 +301,7 @@ class BakedFixedViews:
         """Return the rays along a lobe, which carry light of patches and of the environment."""
         pattern, images = self.lobe_tracer.pattern(lobe, quality), self._hit_images(light)
         narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
-        key = digest((pattern.num_rays, lobe.angles, lobe.axes, lobe.quantile.tobytes(), narrow, images))
+        key = digest((pattern.num_rays, *lobe.identity, narrow, images))
         outgoing = None if patch_light is None else self._patch_light(patch_light, is_canceled)
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled, outgoing)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
@@ -322,7 +322,7 @@ class BakedFixedViews:
         patch_light: Illumination | None = None,
     ) -> SplitLight | None:
         """Return the light at samples in whose pixels a highlight varies. See `FixedViewTransfer`."""
-        return SampleSplitter(self).light(view, material, light, lobe, unsplit, is_canceled, patch_light)
+        return split_light(self, view, material, light, lobe, unsplit, is_canceled, patch_light)
 
     @cached_property
     def shaded_geometry(self) -> SceneBuffers:

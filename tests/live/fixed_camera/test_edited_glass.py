@@ -158,7 +158,7 @@ def test_an_edit_during_tracing_is_traced_next(bake, builder):
     np.testing.assert_allclose(picture.image(), expected, rtol=1e-4, atol=1e-5)
 
 
-def test_other_edits_during_tracing_are_kept(bake, builder):
+def test_tracing_loses_no_other_edits(bake, builder):
     picture = picture_of(bake, builder.make_static_view)
     previewed(with_look(bake, picture, {"roughness": 0.5}))
     job = picture.next_job()
