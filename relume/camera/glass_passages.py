@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from relume.camera.refraction import MAX_GLASS_HITS
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
-from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.camera_rays import camera_directions, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera
@@ -43,7 +42,7 @@ def trace_passages(geometry: SceneBuffers, camera: Camera, size: tuple[int, int]
     alpha_test = geometry.embree.alpha_test
     assert alpha_test is not None  # callers have glass
     masks = alpha_test.alpha_masks
-    glass = np.flatnonzero((masks.material_rule >= 0) & (masks.rules[masks.material_rule, 0] == GLASS_RULE)).tolist()
+    glass = np.flatnonzero(masks.is_glass).tolist()
     num = size[0] * size[1]
     num_surfaces = {index: np.zeros(num, np.uint8) for index in glass}
     length = {index: np.zeros(num, np.float32) for index in glass}

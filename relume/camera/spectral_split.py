@@ -27,7 +27,7 @@ from relume.core.color import luminance
 from relume.core.thread_pools import for_ranges
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.raytrace.alpha_filter import ONE_CHANNEL, PASS_TINT_GROUPS, STOP_AT_OPAQUE
-from relume.raytrace.alpha_test import GLASS_RULE, MAX_TINTS, is_tinted
+from relume.raytrace.alpha_test import MAX_TINTS, is_tinted
 from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
@@ -77,7 +77,7 @@ class TintedLight:
         assert alpha_test is not None
         self.num_groups = int(alpha_test.groups.max(initial=0))
         material_rule = alpha_test.alpha_masks.material_rule
-        self._is_glass = (material_rule >= 0) & (alpha_test.alpha_masks.rules[material_rule, 0] == GLASS_RULE)
+        self._is_glass = alpha_test.alpha_masks.is_glass
         # camera rays already include the transmittance of untinted glass
         is_tinted_glass = self._is_glass & (alpha_test.groups[material_rule] > 0)
         self._tint = np.where(is_tinted_glass[:, None], alpha_test.alpha_masks.rules[material_rule, 1:4], np.float32(1))

@@ -40,6 +40,11 @@ class AlphaMasks(NamedTuple):
     rules: Shaped[F32, "images 6"]
     material_rule: Shaped[NDArray[np.int32], " materials"]
 
+    @property
+    def is_glass(self) -> Shaped[NDArray[np.bool_], " materials"]:
+        """True for materials that transmit light."""
+        return np.isin(self.material_rule, np.flatnonzero(self.rules[:, 0] == GLASS_RULE))
+
 
 def collect_alpha_masks(materials: Sequence[Material]) -> AlphaMasks | None:
     """Collect the opacity and glass of materials; None if there is neither."""

@@ -27,7 +27,6 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.retrace import NormalRetracer
 from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
-from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.raytrace.surface_textures import (
     MapName,
@@ -196,10 +195,10 @@ class LobeTracer:
     def _glass(self) -> Shaped[F32, "materials 4"]:
         """Glass of all materials, see `LobeSurfaces`."""
         alpha_test = self._tracer.geometry.embree.alpha_test
-        if alpha_test is None or not np.any(alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE):
+        if alpha_test is None or not np.any(alpha_test.alpha_masks.is_glass):
             return np.empty((0, 4), np.float32)
         row, rules = alpha_test.alpha_masks.material_rule, alpha_test.alpha_masks.rules
-        materials = np.flatnonzero((row >= 0) & (rules[row, 0] == GLASS_RULE))
+        materials = np.flatnonzero(alpha_test.alpha_masks.is_glass)
         glass = np.full((len(row), 4), -1, np.float32)
         glass[materials] = rules[row[materials], 1:5]
         return glass
