@@ -151,14 +151,18 @@ def render_file(path: Path, tiny: bool) -> dict[str, Pictures]:
     return {", ".join(shot): Pictures(images[k], masks[k], theirs[k]) for k, shot in enumerate(shots)}
 
 
-def orbited(scene: Scene) -> Camera:
-    """The second camera: the first, moved around the vertical through the depth of the scene's middle."""
+def orbited(scene: Scene, steps: float = 1.0) -> Camera:
+    """The second camera: the first, moved around the vertical through the depth of the scene's middle.
+
+    Args:
+        scene: with a camera. steps: multiples of the angle.
+    """
     camera, points = scene.cameras[0], np.concatenate([mesh.positions for mesh in scene.meshes])
     low, high = points.min(axis=0), points.max(axis=0)
     center, position, backward = (low + high) / 2, camera.to_world[:3, 3], camera.to_world[:3, 2]
     is_inside = bool(((position > low) & (position < high)).all())
     pivot = position - backward * max(0.0, float((position - center) @ backward))
-    angle = np.radians(_ORBIT_INSIDE if is_inside else _ORBIT)
+    angle = steps * np.radians(_ORBIT_INSIDE if is_inside else _ORBIT)
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     to_world = camera.to_world.copy()
     to_world[:3, :3], to_world[:3, 3] = turn @ camera.to_world[:3, :3], pivot + turn @ (position - pivot)

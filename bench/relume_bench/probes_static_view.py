@@ -6,7 +6,7 @@ first. `tracing_s` of that are view samples, shadow rays and gather rays; the re
 under a look without indirect light, for which no gather rays are traced. `free_camera_error` is the error of the
 free-camera image against the exact one that replaces it, including edges, which only the exact one antialiases.
 
-`probes.correction_s` ends with the free-camera image that few exact samples have corrected; `first_error` is its error
+`probes.correction_s` ends with the free-camera image that exact direct light has corrected; `first_error` is its error
 against the exact one, `its_…` are of the Cornell box.
 """
 
@@ -42,7 +42,7 @@ _CACHE_BYTES = 4 << 30
 
 
 class _Convergence(NamedTuple):
-    """Seconds until the exact image, those of tracing, and until the first corrected image; errors.
+    """Seconds until the exact image, those of tracing, and until the corrected image; errors.
 
     `error` and `first_error` are the relative RMSE of the free-camera image, and of the corrected one.
     """
@@ -126,7 +126,7 @@ def _measure_convergence(scene: Scene, picture: ProgressivePicture, step: int, s
 
         job.apply(job.run(record_progress, lambda: False))
         picture.advance(None)
-        if job.kind == "exact samples":
+        if job.kind == "direct light":
             picture.encode(picture.all_tiles(), "rgb9e5")
             first, first_s = picture.image().copy(), time.perf_counter() - start_time
     picture.encode(picture.all_tiles(), "rgb9e5")

@@ -112,6 +112,7 @@ TARGETS = {
     "probes.incremental_error": "≤ 10 %",
     "probes.static_view_s": "≤ 10 s",
     "probes.correction_s": "≤ 1 s",
+    "free_camera.correction_ratio": "≤ 1",
     "factorization.phong_terms_per_exponent": "2.5",
     "gather.store_mb": "≤ 116 MB",
     "gather.freeze_s": "≤ 0.5 s",

@@ -132,10 +132,11 @@ def test_static_view_of_an_earlier_camera_is_discarded(picture, free_bake):
 
 def test_static_view_reports_progress_and_resumes(picture, monkeypatch):
     monkeypatch.setattr("relume.live.opened.static_view._ROWS_PER_TASK", 512)
+    run_next_job(picture)  # the correction, for which shadow rays are traced
     job, shares = picture.next_job(), []
     with pytest.raises(CancelledError):
-        job.run(shares.append, lambda: len(shares) > 3)
-    assert shares[0] == 0
+        job.run(shares.append, lambda: len(shares) > 1)
+    assert 0 < shares[0] < 0.5
     again = []
     job.run(again.append, lambda: False)
     assert again[0] > shares[-1]
@@ -159,7 +160,7 @@ def test_static_view_starts_only_if_the_camera_is_idle(picture, moved_camera):
     assert picture.advance(None).fidelity == "approximate"
     assert picture.next_job() is None
     picture.set_camera(moved_camera, SIZE, is_idle=True)
-    assert kind_of(picture.next_job()) == "static view"
+    assert kind_of(picture.next_job()) == "direct light"
 
 
 def test_free_camera_picture_remains_without_memory_for_a_static_view(baked, scene, moved_camera):
@@ -172,14 +173,15 @@ def test_free_camera_picture_remains_without_memory_for_a_static_view(baked, sce
     picture.set_look(make_look(free_bake, add_lights(edit_light("Panel", enabled=False))))
     picture.set_camera(moved_camera, SIZE)
     picture.advance(None)
-    run_next_job(picture)
+    for kind in ("direct light", "static view"):
+        assert kind_of(run_next_job(picture)) == kind
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
 
 
 @pytest.fixture
-def sparse_samples(picture, moved_camera, monkeypatch):
-    """A darkened picture with exact samples at every fourth pixel."""
+def corrected(picture, moved_camera, monkeypatch):
+    """A darkened picture after its correction, and its image before."""
 
     def darkened(transfer, wanted, visible, camera, size, shares):
         frame = render_frame(transfer, wanted, visible, camera, size, shares)
@@ -188,17 +190,16 @@ def sparse_samples(picture, moved_camera, monkeypatch):
 
     for user in ("free_camera_picture", "highlight_edges"):
         monkeypatch.setattr(f"relume.live.free_camera.{user}.render_frame", darkened)
-    monkeypatch.setattr("relume.live.free_camera.static_view_jobs.SAMPLE_SPACING", 4)
-    picture.set_camera(moved_camera, (160, 100))
+    picture.set_camera(moved_camera, SIZE)
     picture.advance(None)
     before, job = picture.image().copy(), picture.next_job()
-    assert kind_of(job) == "exact samples"
+    assert kind_of(job) == "direct light"
     job.apply(job.run(lambda share: None, lambda: False))
     return picture, before
 
 
-def test_sparse_exact_samples_correct_the_free_camera_picture(sparse_samples):
-    picture, before = sparse_samples
+def test_exact_direct_light_corrects_the_free_camera_picture(corrected):
+    picture, before = corrected
     step = picture.advance(None)
     assert (step.exact, step.fidelity, step.previous_error, step.changed) == (False, "approximate", None, True)
     assert picture.array_blocks() is None  # client-side shaders have no correction
@@ -211,23 +212,38 @@ def test_sparse_exact_samples_correct_the_free_camera_picture(sparse_samples):
     assert relative_rmse(first, picture.image()) < 0.4 * step.previous_error
 
 
-def test_sparse_samples_do_not_change_a_correct_picture(picture, moved_camera, monkeypatch):
-    monkeypatch.setattr("relume.live.free_camera.static_view_jobs.SAMPLE_SPACING", 4)
-    picture.set_camera(moved_camera, (160, 100))
+def test_a_corrected_picture_has_exact_direct_light_and_its_own_indirect_light(picture, free_bake, fixed, moved_camera):
+    picture.set_camera(moved_camera, SIZE)
     picture.advance(None)
-    before = picture.image().copy()
     run_next_job(picture)
-    first = picture.image().copy()
+    picture.advance(None)
+    looks = [make_look(free_bake, add_lights(*changes)) for changes in ((), (edit_transport(show="direct"),))]
+    moving = []
+    for look in looks:
+        alone = FreeCameraPicture(free_bake, "front")
+        alone.set_look(look)
+        alone.set_camera(moved_camera, SIZE)
+        alone.advance(None)
+        moving.append(alone.image())
+    expected = np.maximum(moving[0] - moving[1] + render_image(fixed, "front", looks[1]), 0)
+    np.testing.assert_allclose(picture.image(), expected, rtol=1e-4, atol=1e-5)
+    before, after = moving[0], picture.image()
     finish_jobs(picture)
-    assert relative_rmse(first, picture.image()) < 1.01 * relative_rmse(before, picture.image())
+    assert relative_rmse(after, picture.image()) < relative_rmse(before, picture.image())
+
+
+def test_direct_light_alone_is_not_corrected_before_it_is_exact(picture, free_bake):
+    picture.set_look(make_look(free_bake, add_lights(edit_transport(show="direct"))))
+    picture.advance(None)
+    assert kind_of(picture.next_job()) == "static view"
 
 
 @pytest.mark.parametrize("is_edit", [True, False], ids=["a curve drawn", "the camera moved"])
-def test_sparse_correction_is_valid_for_one_look_and_camera(sparse_samples, free_bake, is_edit):
-    picture, _ = sparse_samples
+def test_a_correction_is_valid_for_one_look_and_camera(corrected, free_bake, is_edit):
+    picture, _ = corrected
     assert picture.advance(None).changed
     alone = FreeCameraPicture(free_bake, "front")
-    look, camera_and_size = make_look(free_bake, add_lights(draw_curve)), (free_bake.views["front"].camera, (160, 100))
+    look, camera_and_size = make_look(free_bake, add_lights(draw_curve)), (free_bake.views["front"].camera, SIZE)
     if is_edit:
         picture.set_look(look, active_pointer=LOBE)
         alone.set_look(look)
@@ -239,7 +255,7 @@ def test_sparse_correction_is_valid_for_one_look_and_camera(sparse_samples, free
     assert picture.advance(None).changed
     alone.advance(None)
     np.testing.assert_array_equal(picture.image(), alone.image())
-    assert kind_of(picture.next_job()) == "exact samples"
+    assert kind_of(picture.next_job()) == "direct light"
 
 
 @pytest.fixture

@@ -46,7 +46,6 @@ from relume.live.free_camera.occluded_probes import reweight
 from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
 from relume.live.free_camera.probe_light import LightRequest, ProbeLightState
 from relume.live.free_camera.protocol import FreeCameraTransfer
-from relume.live.free_camera.residual_correction import apply_residual
 from relume.live.free_camera.texel_brdf.texel_tables import get_texel_tables
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
@@ -135,13 +134,19 @@ class FreeCameraPicture:
         self.correct(None)
 
     def correct(self, residual_image: Shaped[F32, "height width 3"] | None) -> None:
-        """Add a residual until the look or camera changes, see `relume.live.free_camera.residual_correction`.
+        """Add a residual until the look or camera changes, see `relume.live.free_camera.static_view_jobs`.
 
         Args:
             residual_image: per pixel, float32; None: none.
         """
         self._is_refined |= residual_image is not None or self.is_corrected
         self._residual_image = residual_image
+
+    def unwatched(self) -> FreeCameraPicture:
+        """Return a new picture of the same camera, with all of its light and fine highlights."""
+        picture = FreeCameraPicture(self._transfer, next(iter(self._transfer.views)))
+        picture.set_camera(self._camera, self._size)
+        return picture
 
     @property
     def is_corrected(self) -> bool:
@@ -528,7 +533,7 @@ class FreeCameraPicture:
         return (
             previous.frame.image
             if self._residual_image is None
-            else apply_residual(previous.frame.image, self._residual_image)
+            else np.maximum(previous.frame.image + self._residual_image, 0)
         )
 
     def inspect(self, x: int, y: int) -> dict[str, Any]:

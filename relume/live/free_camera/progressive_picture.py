@@ -1,13 +1,12 @@
 """Progressive refinement of the free-camera image: when the camera stops, a static view replaces it.
 
-Until the static view is ready, a few exactly shaded samples correct the free-camera image.
+Until the static view is ready, its direct light corrects the free-camera image.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -28,7 +27,7 @@ from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.static_view_jobs import (
     SizedCamera,
     StaticViewState,
-    residual_job,
+    correction_job,
     should_correct,
     static_view_job,
 )
@@ -138,8 +137,9 @@ class ProgressivePicture:
             self._make_static_view, self._cache, self._free_camera_picture.sized_camera, self._look, self._solo
         )
         request = self._camera_seq, self._look_seq
-        if self._corrected_for != request and should_correct(view_state):
-            return residual_job(view_state, copy(self._free_camera_picture), request, partial(self._correct, request))
+        if self._corrected_for != request and should_correct(self._look):
+            unwatched = self._free_camera_picture.unwatched()
+            return correction_job(view_state, unwatched, request, partial(self._correct, request))
         return static_view_job(view_state, request, partial(self._set_static_picture, self._camera_seq))
 
     def _correct(self, request: tuple[int, int], residual_image: F32 | None) -> None:

@@ -1,4 +1,11 @@
-"""Jobs when the camera stops: a few exact samples that correct the image, then the exact image."""
+"""Jobs when the camera stops: exact direct light corrects the image, then the exact image replaces it.
+
+    C = max(M + E_d − M_d, 0)
+
+M is the free-camera image, M_d the same under direct light alone, and E_d exact direct light, which is traced before
+the gather rays of the exact image and takes about half of its time. What is left is the error of indirect light. A
+sparse E_d, interpolated, brings less than it harms (docs/free-camera.md#when-the-camera-stops).
+"""
 
 from __future__ import annotations
 
@@ -18,7 +25,7 @@ from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.fixed_camera.protocols import StaticViewFactory
 from relume.live.fixed_camera.view_images import material_documents
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.residual_correction import CorrectionSamples, residual
+from relume.live.free_camera.lobe_terms import has_traced_lobe
 from relume.look import Look
 from relume.look.glass import glass_of
 from relume.scene.model import Camera
@@ -27,8 +34,6 @@ F32 = NDArray[np.float32]
 SizedCamera = tuple[Camera, tuple[int, int]]
 
 TRACING_FRACTION = 0.5  # of the progress of a static view; the rest is shading
-SAMPLE_SPACING = 8  # pixels from one sparse sample to the next
-_MIN_SPARSE_SAMPLES = 1000  # with fewer samples, the exact image takes no longer
 
 
 @dataclass(frozen=True)
@@ -80,64 +85,66 @@ class StaticViewState:
         return picture
 
 
-def should_correct(view_state: StaticViewState) -> bool:
-    """Return whether direct light is shown and the image is large enough for a residual from sparse samples."""
-    width, height = view_state.sized_camera[1]
-    return (
-        view_state.look.transport.paths.direct
-        and (width // SAMPLE_SPACING) * (height // SAMPLE_SPACING) >= _MIN_SPARSE_SAMPLES
-    )
+def should_correct(look: Look) -> bool:
+    """Return whether direct light is exact before all light is."""
+    return look.transport.paths.direct and look.transport.paths.has_indirect
 
 
-def residual_job(
+def correction_job(
     view_state: StaticViewState,
     free_camera_picture: FreeCameraPicture,
     key: tuple[int, int],
     apply: Callable[[F32 | None], None],
 ) -> Job:
-    """Return the job that computes the residual of direct light from few exact samples.
+    """Return the job that computes the error of direct light in the free-camera image.
 
     Args:
-        view_state: the exact target. free_camera_picture: the image to correct, a copy for this job alone.
-        key: equal for jobs of one camera and look. apply: receives the residual; None if there is nothing to correct.
+        view_state: the exact target. free_camera_picture: another picture of its camera, for this job alone.
+        key: equal for jobs of one camera and look. apply: receives E_d − M_d; None if it is not available.
     """
     return Job(
-        ("exact samples", *key),
-        "exact samples of this camera",
+        ("direct light", *key),
+        "exact direct light",
         Priority.REFINEMENT,
-        lambda progress, is_canceled: _sparse_residual(view_state, free_camera_picture, progress, is_canceled),
+        lambda progress, is_canceled: _direct_residual(view_state, free_camera_picture, progress, is_canceled),
         apply,
     )
 
 
-def _sparse_residual(
+def _direct_residual(
     view_state: StaticViewState, picture: FreeCameraPicture, progress: ProgressCallback, is_canceled: CancelCheck
 ) -> Shaped[F32, "height width 3"] | None:
-    """Trace, shade and compare; None for no residual."""
-    (camera, size), gbuffer = view_state.sized_camera, picture.gbuffer
-    if len(gbuffer.glass.ray):  # reflections and the background of glass have different residuals
-        return None
-    transport = view_state.look.transport.model_copy(update={"show": "direct"})
-    look = view_state.look.model_copy(update={"transport": transport})
-    coarse_size = size[0] // SAMPLE_SPACING, size[1] // SAMPLE_SPACING
-    direct_view = replace(view_state, sized_camera=(camera, coarse_size), look=look)
+    """E_d − M_d, zero behind glass, whose refracted background differs; None if the view is not available."""
+    look = _direct_look(view_state.look)
     try:
-        exact = direct_view.static_picture(progress, is_canceled, smooths_edges=False).image()
+        exact = replace(view_state, look=look).static_picture(progress, is_canceled).image()
     except CancelledError:
         raise
     except RelumeError:  # the scene is gone, or it needs more memory than there is
         return None
-    picture.set_look(look, solo=direct_view.solo)
-    radiance, sample_gbuffer = picture.render_pixel_centers(coarse_size)
-    # in direct light alone, mirrors of the exact image reflect lit surfaces, and lobe rays of the other reflect none
-    mirrors = [is_mirror(material_documents(look, name)) for name in picture.material_names]
-    samples = CorrectionSamples.from_gbuffer(picture.stored_scene, sample_gbuffer, camera, coarse_size[0])
-    samples = samples.exclude_edges(gbuffer.owner, size).exclude_materials(np.flatnonzero(mirrors))
-    pixels = CorrectionSamples.from_gbuffer(
-        picture.stored_scene, gbuffer.pixel_centers(size[0] * size[1]), camera, size[0]
-    )
-    residual_image = residual(radiance, exact, samples, pixels)
-    return residual_image if residual_image.any() else None
+    picture.set_look(look, solo=view_state.solo)
+    picture.advance(None)
+    residual, (height, width, _) = exact - picture.image(), exact.shape
+    gbuffer = picture.gbuffer
+    residual.reshape(-1, 3)[
+        gbuffer.pixel_of_ray(width * height)[len(gbuffer.directions) - len(gbuffer.glass.ray) :]
+    ] = 0
+    return residual
+
+
+def _direct_look(look: Look) -> Look:
+    """The look under direct light, in which mirrors and narrow lobes are black: they reflect light of all paths."""
+    materials = {
+        name: material.model_copy(update={"terms": ()}) if _is_sharp(look, name) else material
+        for name, material in look.materials.items()
+    }
+    transport = look.transport.model_copy(update={"show": "direct"})
+    return look.model_copy(update={"transport": transport, "materials": materials})
+
+
+def _is_sharp(look: Look, name: str) -> bool:
+    terms = material_documents(look, name)
+    return is_mirror(terms) or has_traced_lobe(terms)
 
 
 def static_view_job(
