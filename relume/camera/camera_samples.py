@@ -24,7 +24,7 @@ from relume.camera.specular_hits import MAX_MIRROR_BOUNCES
 from relume.camera.tiling import MAX_CONCURRENT_TILES, ImageTile, image_tiles
 from relume.camera.transparency_layers import TransparencyLayer, trace_layers
 from relume.core.thread_pools import map_ordered
-from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
+from relume.raytrace.alpha_filter import NUM_OFFSETS, STOP_AT_OPAQUE
 from relume.raytrace.camera_rays import camera_directions
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera, Scene
@@ -216,4 +216,5 @@ def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:
     """Stratified alpha samples of the rays of p pixels, so that coverage is exact on average. (p · num,)"""
     order = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # decorrelated from the rows of the positions
     offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # without it, eighths would be visible as steps
-    return np.asarray((order[order < num] + offset) / num + 1e-6, np.float32).ravel()
+    offset = (np.floor(NUM_OFFSETS * offset) + 0.5) / NUM_OFFSETS
+    return np.asarray((order[order < num] + offset) / num, np.float32).ravel()

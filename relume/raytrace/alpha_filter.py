@@ -33,6 +33,7 @@ _DIRECTION, _TIME = 4, 7  # rows of RTCRayN; the time is free for the alpha samp
 _U, _V, _PRIMITIVE = 3, 4, 5  # rows of RTCHitN
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
 _MAX_ALPHA_SAMPLE = np.float32(254.5 / 255)  # below the opacity of texels of 255, however it is rounded
+NUM_OFFSETS = 4096  # of the samples of different pixels within a stratum of 1/8; samples lie in the middle of one
 # alpha samples of rays that stop at any partly opaque surface, of rays that stop only at opaque surfaces, and of rays
 # that ignore glass and otherwise use the hash of their direction
 STOP_AT_PARTIAL, STOP_AT_OPAQUE, IGNORE_GLASS = np.float32(-1), np.float32(2), np.float32(-2)
@@ -157,15 +158,20 @@ def _hash_bits(bits):  # type: ignore[no-untyped-def]
 def _alpha_sample(alpha_sample, face, sheet, x, y, z, is_back_face):  # type: ignore[no-untyped-def]
     """Alpha sample in (0, 1) of a ray at a blended surface: the given one, or a hash of its direction (x, y, z).
 
-    A given sample is shifted per face, so that successive surfaces are independent. All rays to one light have one
-    direction and so the same sample at the front or back of each sheet: shadows of glass have no noise.
+    A given sample is shifted per face and pixel, so that successive surfaces are independent. Rays of a pixel keep
+    their strata at each face: their samples differ by multiples of 1/8, so that the rest of the division identifies the
+    pixel. All rays to one light have one direction and so the same sample at the front or back of each sheet: shadows
+    of glass have no noise.
     """
     if alpha_sample == STOP_AT_PARTIAL:
         return np.float32(1 / 512)
     if alpha_sample == STOP_AT_OPAQUE:
         return _MAX_ALPHA_SAMPLE
     if alpha_sample > 0:
-        shifted = alpha_sample + np.float32(_hash_bits(np.uint32(face)) >> np.uint32(8)) * np.float32(2**-24)
+        eighths = np.float32(8) * alpha_sample
+        pixel = np.uint32(np.float32(NUM_OFFSETS) * (eighths - np.floor(eighths)))
+        bits = _hash_bits(np.uint32(np.uint32(face) ^ _hash_bits(pixel)))
+        shifted = alpha_sample + np.float32(bits >> np.uint32(8)) * np.float32(2**-24)
         return min(shifted - np.float32(1) if shifted > 1 else shifted, _MAX_ALPHA_SAMPLE)
     bits = np.uint32(2 * sheet + is_back_face)
     for component in (x, y, z):
