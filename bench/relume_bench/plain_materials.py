@@ -20,6 +20,7 @@ _FINER = 4  # texels of an alpha mask per texel of the image
 _LEAST_SHEEN = 0.07**2
 _CLEAR, _LEAST_FROST = 0.1, 0.03  # roughness up to which glass is smooth; the least of frosted texels
 _LEAST_FROSTED_IOR = 1.01
+_NEAREST = {"filter_type": "nearest"}
 
 
 class Materials:
@@ -123,15 +124,18 @@ class Materials:
 
     def _opacity(self, description: Description, pbr: Description, name: str) -> Any:
         """Alpha, thresholded for masks, between texels as well."""
+        info, more = pbr.get("baseColorTexture"), {} if description["alphaMode"] == "BLEND" else _NEAREST
+        return self._image(f"{name}_alpha", self._alpha_texels(description, pbr), info, **more)
+
+    def _alpha_texels(self, description: Description, pbr: Description) -> F32:
         info, alpha = pbr.get("baseColorTexture"), pbr.get("baseColorFactor", [1, 1, 1, 1])[3]
         texels = np.full((1, 1, 1), alpha, np.float32)
         if info is not None:
             texels = texels * self._file.image(info["index"])[..., 3:] / np.float32(255)
         if description["alphaMode"] == "BLEND":
-            return self._image(f"{name}_alpha", texels, info)
+            return texels
         fine = _finer(texels, _FINER) if info is not None else texels
-        cut = (fine >= description.get("alphaCutoff", 0.5)).astype(np.float32)
-        return self._image(f"{name}_alpha", cut, info, filter_type="nearest")
+        return (fine >= description.get("alphaCutoff", 0.5)).astype(np.float32)
 
     def _make_emitter(self, description: Description, name: str) -> Description:
         factor = np.array(description.get("emissiveFactor", [0, 0, 0]), np.float32)
@@ -141,9 +145,15 @@ class Materials:
         info, texels = description.get("emissiveTexture"), np.ones((1, 1, 3), np.float32)
         if info is not None:
             texels = linear(np.asarray(self._file.image(info["index"])[..., :3] / np.float32(255), np.float32))
-        if not texels.any():
-            return {}
-        return {"emitter": {"type": "area", "radiance": self._image(f"{name}_emission", texels * factor, info)}}
+        if description.get("alphaMode", "OPAQUE") == "MASK":  # the peer's emitters shine through holes
+            alpha = self._alpha_texels(description, description.get("pbrMetallicRoughness", {}))
+            finer = _finer(texels, _FINER) if info is not None else texels
+            if 1 not in (len(alpha), len(finer)) and alpha.shape[:2] != finer.shape[:2]:
+                raise ValueError("masks of another size than the emission are not in these files")
+            radiance = self._image(f"{name}_emission", finer * alpha * factor, info, **_NEAREST)
+        else:
+            radiance = self._image(f"{name}_emission", texels * factor, info)
+        return {"emitter": {"type": "area", "radiance": radiance}} if texels.any() else {}
 
     def _transmitting(
         self, description: Description, pbr: Description, name: str, transmission: Description, opaque: Description

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from relume_bench.gltf_plain import _TRIANGLES, File, Shape, _complete_normals
 from relume_bench.plain_job import make_job
@@ -113,3 +114,21 @@ def test_normals_without_length_are_those_of_the_triangles() -> None:
     attributes = triangle().attributes
     completed = _complete_normals(normals, attributes, np.uint32([[0, 1, 2]]))
     np.testing.assert_allclose(completed, [[0, 0, 1], [0, 0, 1], [0, 0.6, 0.8]])
+
+
+def test_holes_of_a_mask_do_not_shine(tmp_path: Path) -> None:
+    Image.fromarray(np.uint8([[[255, 255, 255, 255], [255, 255, 255, 0]]])).save(tmp_path / "mask.png")
+    material = {
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+        "alphaMode": "MASK",
+        "emissiveFactor": [1, 0.5, 0],
+        "emissiveTexture": {"index": 0},
+    }
+    document = {"materials": [material], "textures": [{"source": 0}], "images": [{"uri": "mask.png"}]}
+    materials = Materials(File(document, tmp_path))
+    bsdf = materials.bsdf(0, {})
+    shining = materials.arrays[bsdf["emitter"]["radiance"]["array"]]
+    opaque = materials.arrays[bsdf["opacity"]["array"]]
+    np.testing.assert_array_equal((shining > 0).any(axis=2), opaque[..., 0] > 0)
+    assert 0 < opaque.mean() < 1
+    assert shining[0, 1] == pytest.approx([1, 0.5, 0])
