@@ -388,6 +388,18 @@ class FreeCameraPicture:
         shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
         return render_frame(self._transfer, state, gbuffer, self._camera, size, shadow_visibility).image, gbuffer
 
+    def render_moving(self) -> tuple[Shaped[F32, "height width 3"], GBuffer]:
+        """Render the image of a moving camera anew: without fine highlights, and without a residual.
+
+        Returns:
+            Linear radiance, float32, and the G-buffer.
+        """
+        assert self._look is not None
+        gbuffer = self._current_gbuffer()
+        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=False)
+        shadow_visibility = self._trace_shadow_visibility(state.incident.hard_shadow_lights, gbuffer)
+        return render_frame(self._transfer, state, gbuffer, self._camera, self._size, shadow_visibility).image, gbuffer
+
     @property
     def stored_scene(self) -> StoredScene:
         """The scene."""
