@@ -43,6 +43,6 @@ def test_black_and_white_differ_by_the_whole_lightness() -> None:
     assert color_difference(black, black).max() == color_difference(white, white).max() == 0
 
 
-def test_an_eight_bit_step_of_gray_cannot_be_seen() -> None:
+def test_an_eight_bit_step_of_gray_is_hardly_visible() -> None:
     steps = np.arange(256, dtype=np.float32)[:, None, None].repeat(3, axis=2) / 255
     assert color_difference(steps[1:], steps[:-1]).max() < 0.7
