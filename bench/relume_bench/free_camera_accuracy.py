@@ -120,8 +120,8 @@ def _scenes(sizes: FreeCameraSizes) -> Iterator[tuple[str, Scene]]:
     for name in list(BUILT_IN)[: sizes.built_in]:
         yield name, built_in(name)
     files = list(asset_files(shared_data()))
-    chosen = np.linspace(0, len(files) - 1, min(sizes.files, len(files))).astype(int) if files else []
-    for k, (name, path) in enumerate(files[index] for index in chosen):
+    spaced = np.linspace(0, len(files) - 1, min(sizes.files, len(files))).astype(int) if files else []
+    for k, (name, path) in enumerate(files[index] for index in spaced):
         yield name, import_scene(path, path.stem, environment_of(ENVIRONMENTS[k % len(ENVIRONMENTS)]))
 
 
@@ -203,14 +203,23 @@ def _compare(
     """Errors of an image of a moving camera."""
     comparison = compare_pixels(image.astype(np.float64), passes, is_surface)
     rested = compare_pixels(exact.astype(np.float64), passes, is_surface)
-    luminance, exact_luminance = (picture[is_surface] @ _LUMINANCE for picture in (image, exact))
-    black = _BLACK * exact_luminance.mean()
-    ratio = (luminance + black) / (exact_luminance + black)
     return {
         "rmse": comparison.error.value if comparison.is_significant else comparison.limit,
         "rmse_standard_error": comparison.error.standard_error,
         "bias": comparison.bias.value,
         "static_view_rmse": rested.error.value,
         "surface_pixels": int(is_surface.sum()),
-        "blot_pixels": int(((ratio > _BLOT) | (ratio < 1 / _BLOT)).sum()),
+        "blot_pixels": count_blots(image[is_surface], exact[is_surface]),
     }
+
+
+def count_blots(radiance: NDArray[np.floating], exact: NDArray[np.floating]) -> int:
+    """Number of pixels more than `_BLOT` times brighter or darker than the exact ones.
+
+    Args:
+        radiance, exact: linear radiance of pixels. (n, 3)
+    """
+    luminance, exact_luminance = (values @ _LUMINANCE for values in (radiance, exact))
+    black = _BLACK * exact_luminance.mean()
+    ratio = (luminance + black) / (exact_luminance + black)
+    return int(((ratio > _BLOT) | (ratio < 1 / _BLOT)).sum())
