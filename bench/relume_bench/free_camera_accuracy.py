@@ -98,7 +98,11 @@ def measure(tiny: bool) -> list[Figure]:
 def summarize(
     images: Mapping[str, Mapping[str, float]], failures: Mapping[str, str], sizes: FreeCameraSizes
 ) -> list[Figure]:
-    """The figures of all images, by scene and camera. Raises ValueError if all scenes failed."""
+    """Summarize the errors of all images. Raises ValueError if all scenes failed.
+
+    Args:
+        images: errors by scene and camera. failures: reasons by scene. sizes: that were measured.
+    """
     if not images:
         raise ValueError(f"no scene could be measured: {dict(failures)}")
     rmse = [errors["rmse"] for errors in images.values()]
@@ -120,7 +124,7 @@ def _scenes(sizes: FreeCameraSizes) -> Iterator[tuple[str, Scene]]:
     for name in list(BUILT_IN)[: sizes.built_in]:
         yield name, built_in(name)
     files = list(asset_files(shared_data()))
-    spaced = np.linspace(0, len(files) - 1, min(sizes.files, len(files))).astype(int) if files else []
+    spaced: list[int] = np.linspace(0, len(files) - 1, min(sizes.files, len(files))).astype(int).tolist()
     for k, (name, path) in enumerate(files[index] for index in spaced):
         yield name, import_scene(path, path.stem, environment_of(ENVIRONMENTS[k % len(ENVIRONMENTS)]))
 

@@ -309,7 +309,7 @@ def filled(text: str, figures: list[dict[str, Any]], older: Collection[str] = ()
     """Fill a page with these figures. Raises ValueError if the page has no marks.
 
     Args:
-        older: names of figures older than the code that they measure.
+        text: of the page. figures: entries of its file. older: names of figures older than the code that they measure.
     """
     before, _, suffix = text.partition(BEGIN)
     _, mark, after = suffix.partition(END)
