@@ -21,7 +21,7 @@ from relume.store.run_bake import bake_in_process
 @pytest.fixture(scope="module", autouse=True)
 def unmeasured():
     """Free-camera bakes skip the measurement of their error, a third of their time."""
-    with patch.object(free_camera_error, "measure_error", return_value=np.full(2, np.nan, np.float32)):
+    with patch.object(free_camera_error, "measure_error", return_value=np.full((2, 2), np.nan, np.float32)):
         yield
 
 

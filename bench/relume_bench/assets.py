@@ -29,6 +29,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 import relume
+from relume.assets.environments.environment import Environment
 from relume.assets.environments.read_environment import read_environment
 from relume.core.cache import Cache
 from relume.core.digest import digest
@@ -170,7 +171,8 @@ def orbited(scene: Scene, steps: float = 1.0) -> Camera:
 
 
 @cache
-def _environment(name: str) -> Any:
+def environment_of(name: str) -> Environment:
+    """One of `ENVIRONMENTS`."""
     return read_environment(shared_data() / "envmaps" / f"{name}.hdr", name)
 
 
@@ -182,7 +184,7 @@ def _render_relume(
     stored = platformdirs.user_cache_path("relume") / "assets" / f"{path.stem}-{key}.npz"
     if not stored.is_file():
         stored.parent.mkdir(parents=True, exist_ok=True)
-        lit = with_cameras(import_scene(path, path.stem, _environment(environment)), [scene.cameras[-1]])
+        lit = with_cameras(import_scene(path, path.stem, environment_of(environment)), [scene.cameras[-1]])
         width, height = sizes.size
         recipe = Recipe("gather", tuple(views), (_FINER * width, _FINER * height), sizes.lights)
         with tempfile.TemporaryDirectory() as folder:
@@ -219,7 +221,7 @@ def _render_mitsuba(path: Path, scene: Scene, shots: Sequence[tuple[str, str]], 
         ],
     }  # fmt: skip
     arrays |= {f"camera {view}": cameras[view].to_world for _, view in shots}
-    arrays |= {environment: map_for_mitsuba(_environment(environment).radiance) for environment, _ in shots}
+    arrays |= {environment: map_for_mitsuba(environment_of(environment).radiance) for environment, _ in shots}
     key = (job, {name: digest(np.ascontiguousarray(values).tobytes()) for name, values in arrays.items()})
     return cache_passes(key, lambda folder: run_peer(arrays, job, folder), "gltf")
 

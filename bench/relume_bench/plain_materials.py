@@ -135,7 +135,7 @@ class Materials:
         if description["alphaMode"] == "BLEND":
             return texels
         fine = _finer(texels, _FINER) if info is not None else texels
-        return (fine >= description.get("alphaCutoff", 0.5)).astype(np.float32)
+        return np.asarray(fine >= description.get("alphaCutoff", 0.5), np.float32)
 
     def _make_emitter(self, description: Description, name: str) -> Description:
         factor = np.array(description.get("emissiveFactor", [0, 0, 0]), np.float32)

@@ -1,13 +1,13 @@
-"""probes.rmse_*: the whole free-camera view against Mitsuba's full path tracer.
+"""probes.rmse_*: the image of a moving free camera against Mitsuba's full path tracer.
 
 The scenes of `relume_bench.probes`, all surfaces of one material: diffuse in the Cornell box under its environment, or
 under one of the same power whose sun is an eighth as wide, with a radius of 0.5° (`hard_sun`); only a Blinn–Phong
 highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2); or a GGX
 metal, whose highlights have long tails, of these roughnesses, F0 of 0.9 (`ggx_…`; Mitsuba's `principled`). Mitsuba
 traces all paths, including highlights that light other surfaces, which relume represents by few functions. Edges and
-background are included. The image is a refined frame, as right after the camera stops and in renders; `while_it_moves`
-is that of a frame with moving camera, `static_view` of the fixed view that replaces it, in percent. Mitsuba's noise is
-removed: `relume_bench.standard_error.compare_with_passes`.
+background are included. In the context, in percent: `fine_frame`, right after the camera stops and in approximate
+renders; `static_view`, the fixed view that replaces it. Mitsuba's noise is removed:
+`relume_bench.standard_error.compare_with_passes`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.catalog import built_in
 from relume.scene.examples.cornell import sunny_environment
-from relume.scene.model import Scene
+from relume.scene.model import Camera, Scene
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure, skipped
@@ -87,13 +87,26 @@ def _make_mitsuba_bsdf(kind: str) -> dict[str, Any]:
 
 def render_moving_camera(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.float32]:
     """Render the image of a moving camera, with all light. bake, view, look: what is shown"""
+    return moving_picture(bake, view, look).image()
+
+
+def moving_picture(
+    bake: BakedFreeCamera, view: str, look: Look, sized_camera: tuple[Camera, tuple[int, int]] | None = None
+) -> FreeCameraPicture:
+    """Make the picture of a moving camera, with all light.
+
+    Args:
+        bake, view, look: what is shown. sized_camera: another camera than the view's, and the size of the image.
+    """
     picture = FreeCameraPicture(bake, view, is_watched=True)
     picture.set_look(look)
+    if sized_camera is not None:
+        picture.set_camera(*sized_camera)
     picture.advance(None)
     while (job := picture.next_job()) is not None and job.kind != "highlights":
         job.apply(job.run(lambda share: None, lambda: False))
         picture.advance(None)
-    return picture.image()
+    return picture
 
 
 def _render_fixed_camera(scene: Scene, recipe: Recipe, folder: Path, look: Look) -> NDArray[np.float32]:
@@ -115,9 +128,9 @@ def _figure(kind: str, tiny: bool) -> Figure:
         for material in document["materials"].values():
             material["terms"] = copy.deepcopy(terms)
         look = validate(document, bake.default_look)
-        rendered = render_image(bake, recipe.views[0], look)
+        fine_frame = render_image(bake, recipe.views[0], look)
         assert isinstance(bake, BakedFreeCamera)
-        plain = render_moving_camera(bake, recipe.views[0], look)
+        rendered = render_moving_camera(bake, recipe.views[0], look)
         fixed_camera_image = _render_fixed_camera(scene, replace(recipe, method="gather"), Path(folder), look)
         integrator = {"type": "path", "max_depth": MAX_BOUNCES + 2, "rr_depth": 6}
         job = {
@@ -131,7 +144,7 @@ def _figure(kind: str, tiny: bool) -> Figure:
     comparison = compare_with_passes(rendered.astype(np.float64), reference_passes)
     rested = compare_with_passes(fixed_camera_image.astype(np.float64), reference_passes)
     error_details = {
-        "while_it_moves": 100 * compare_with_passes(plain.astype(np.float64), reference_passes).error.value,
+        "fine_frame": 100 * compare_with_passes(fine_frame.astype(np.float64), reference_passes).error.value,
         "static_view": 100 * rested.error.value,
         "static_view_bias": rested.context["bias"],
     }

@@ -7,7 +7,7 @@ import json
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import date
 from typing import Any
@@ -16,6 +16,7 @@ from relume.store.schema import SCHEMA_VERSION
 from relume_bench.check import HEAD, Verdict, judge, line, stored_figures
 from relume_bench.figure import Figure
 from relume_bench.machine import measure_stolen_fraction, processor_ticks
+from relume_bench.measured_code import is_older, measured_code
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class Group:
             "measured_in_s": round(time.perf_counter() - start_time, 1),
             "stolen_share": measure_stolen_fraction(ticks, processor_ticks()),
             "measured_on": f"{date.today().isoformat()}, schema {SCHEMA_VERSION}",
+            "code": measured_code(self.module),
         }
         return [replace(figure, context={**figure.context, **details}) for figure in figures]
 
@@ -163,6 +165,10 @@ GROUPS = (
         tuple(
             f"probes.rmse_{kind}" for kind in ("diffuse", "hard_sun", "glossy_0.5", "glossy_0.3", "ggx_0.5", "ggx_0.3")
         ),
+    ),
+    Group(
+        "relume_bench.free_camera_accuracy",
+        ("free_camera.rmse_median", "free_camera.rmse_worst", "free_camera.blots"),
     ),
     Group("relume_bench.probes_static_view", ("probes.static_view_s", "probes.correction_s")),
     Group("relume_bench.free_camera_correction", ("free_camera.correction_ratio",)),
@@ -287,6 +293,29 @@ def measure(prefix: str, tiny: bool = False, *, quick: bool = False) -> Iterator
         names = [name for name in group.names if name.startswith(prefix) and (group.is_quick or not quick)]
         if names:
             yield from (figure for figure in group.measure(tiny) if figure.name in names)
+
+
+def find_older(stored: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Names of figures that must be measured again: without a stored value, or older than their code.
+
+    Args:
+        stored: entries of the pages by name.
+    """
+    names = ((name, group.module) for group in GROUPS for name in group.names)
+    return [name for name, module in names if name not in stored or is_older(stored[name], module)]
+
+
+def print_older(prefix: str) -> int:
+    """Print the figures of `find_older` with the date of their row; 1 if there are any.
+
+    Args:
+        prefix: prefix of the figures; "" for all.
+    """
+    stored = stored_figures()
+    older = [name for name in find_older(stored) if name.startswith(prefix)]
+    for name in older:
+        print(f"{name:<38} {stored[name]['context']['measured_on'] if name in stored else 'never measured'}")
+    return int(bool(older))
 
 
 def run(prefix: str, as_json: bool, tiny: bool = False, *, quick: bool = False, check: bool = False) -> int:

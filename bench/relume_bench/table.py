@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ DOCS = next((folder for folder in Path(__file__).resolve().parents if (folder / 
 BEGIN, END = "<!-- figures, written by relume_bench.table -->", "<!-- end of figures -->"
 HEAD = ["| figure | value | target | limit or peer | date |", "|---|---|---|---|---|"]
 PAGES = ("performance", "accuracy")
+OLDER = " \\*"  # behind the date of a figure that is older than its code
 
 TARGETS = {
     "frame.bandwidth_ratio": "≥ 0.8",
@@ -100,6 +102,9 @@ TARGETS = {
     "btf.view_fps": "≥ 24",
     "btf.light_ms": "≤ 80 ms",
     "btf.light_bytes": "≤ 50 kB",
+    "free_camera.rmse_median": "≤ 6 %",
+    "free_camera.rmse_worst": "≤ 12 %",
+    "free_camera.blots": "≤ 0.2 %",
     "probes.rmse_diffuse": "≤ 3 %",
     "probes.rmse_hard_sun": "≤ 8 %",
     "probes.rmse_glossy_0.5": "≤ 6 %",
@@ -178,6 +183,8 @@ PEERS = {
     "flood.latency_ratio": "1, quiet server",
     "frame.bandwidth_ratio": "1, summing the same bytes",
     "frame.incremental_rmse": "T · c in float64",
+    "free_camera.blots": "the static view",
+    "free_camera.rmse_": "Mitsuba 3",
     "freeze.curve_switch_s": "2.1 s, Ben-Artzi 2006",
     "gather.full_": "Mitsuba 3, whole materials",
     "gather.incremental_error": "the same look, shaded",
@@ -253,6 +260,8 @@ def find_document(name: str) -> str:
                 "sharp.static",
                 "sharp.moving",
                 "lights.rmse",
+                "free_camera.rmse",
+                "free_camera.blots",
                 "btf.compression_error",
                 "btf.compression_ratio",
                 "btf.geometry",
@@ -265,12 +274,12 @@ def find_document(name: str) -> str:
     )
 
 
-def row(figure: dict[str, Any]) -> str:
-    """One row of a table."""
+def row(figure: dict[str, Any], *, is_older: bool = False) -> str:
+    """One row of a table. is_older: than the code that it measures"""
     date = str(figure["context"].get("measured_on", "")).partition(",")[0]
     name = figure["name"]
     target = TARGETS.get(name, "") + (" (missed)" if "known_miss" in figure else "")
-    return f"| `{name}` | {value_text(figure)} | {target} | {find_peer(name)} | {date} |"
+    return f"| `{name}` | {value_text(figure)} | {target} | {find_peer(name)} | {date}{OLDER * is_older} |"
 
 
 def value_text(figure: dict[str, Any]) -> str:
@@ -297,17 +306,23 @@ def merge(stored: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[
     return [figures[name] for name in sorted(figures)]
 
 
-def filled(text: str, figures: list[dict[str, Any]]) -> str:
-    """Fill a page with these figures. Raises ValueError if the page has no marks."""
+def filled(text: str, figures: list[dict[str, Any]], older: Collection[str] = ()) -> str:
+    """Fill a page with these figures. Raises ValueError if the page has no marks.
+
+    Args:
+        text: of the page. figures: entries of its file. older: names of figures older than the code that they measure.
+    """
     before, _, suffix = text.partition(BEGIN)
     _, mark, after = suffix.partition(END)
     if not mark:
         raise ValueError("the page has no table of figures; add the two marks of relume_bench.table")
-    return "\n".join([before + BEGIN, *HEAD, *map(row, figures), END]) + after
+    return "\n".join([before + BEGIN, *HEAD, *(row(f, is_older=f["name"] in older) for f in figures), END]) + after
 
 
 def main() -> int:
     """Read the JSON list from standard input and write both files and pages."""
+    from relume_bench.registry import find_older  # it imports this module
+
     measured = json.load(sys.stdin)
     for name in PAGES:
         file, page = DOCS / f"{name}.json", DOCS / f"{name}.md"
@@ -315,7 +330,8 @@ def main() -> int:
         figures = merge(json.loads(file.read_text()), mine)
         lines = ",".join("\n" + json.dumps(figure, ensure_ascii=False) for figure in figures)
         file.write_text(f"[{lines}\n]\n")
-        page.write_text(filled(page.read_text(), figures))
+        older = find_older({figure["name"]: figure for figure in figures})
+        page.write_text(filled(page.read_text(), figures, older))
         asset_table.fill_page(DOCS, figures)
     return 0
 

@@ -190,8 +190,11 @@ def _report_free_camera_error(store: Path) -> None:
 
     free_camera_error = read_free_camera_error(open_store(store))
     if free_camera_error is not None:
-        error_percent, deviation = 100 * free_camera_error.value, 100 * free_camera_error.standard_error
-        note(f"free camera: {error_percent:.1f} ± {deviation:.1f} % RMS error on surfaces; exact once it stops")
+        (delta_e, spread), (rms, rms_spread) = free_camera_error
+        note(
+            f"while the camera moves: mean color difference ΔE {delta_e:.1f} ± {spread:.1f} on surfaces (1 is just "
+            f"noticeable), {100 * rms:.1f} ± {100 * rms_spread:.1f} % RMS of radiance; exact once it stops"
+        )
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:

@@ -500,10 +500,10 @@ export interface ExampleSceneBody {
   method: string;
 }
 
-/** Exactness of an image with respect to its look, worst first; of several images, the worst counts. - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet. - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image. - INCREMENTAL: an exact image plus the approximate change of its light, or of a curve by merged lights or a subset of the samples. - NEAR_EXACT: a sum over the few nodes of a parameter, of quantized columns, or with noticeable float32 rounding; within a thousandth (relative RMS). - EXACT: the complete sum over all light that was baked. Everything below EXACT is replaced when nobody edits. One number goes with it: the error that the replaced image had, if it was measured (`previous_error`). */
+/** Exactness of an image with respect to its look, worst first; of several images, the worst counts. - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet. - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image. - INCREMENTAL: an exact image plus the approximate change of its light, or of a curve by merged lights or a subset of the samples. - NEAR_EXACT: a sum over the few nodes of a parameter, of quantized columns, or with noticeable float32 rounding; within a thousandth (relative RMS). - EXACT: the complete sum over all light that was baked. Everything below EXACT is replaced when nobody edits. The first exact image after a free camera stopped comes with the error of the image that was shown while it moved (`free_camera_error`). */
 export type Fidelity = "preview" | "approximate" | "incremental" | "near_exact" | "exact";
 
-/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact; `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after the camera stopped: error of the approximate image before it, relative RMS. `traces_lobes`: a free camera traces rays along narrow lobes, which a browser cannot draw. `scene_update`: only for kind "scene_update". */
+/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact; `fidelity`: of its visible region. `complete`: every term is shown. `free_camera_error`: with the first exact frame after the camera stopped: error of the image shown while it moved, without corrections. `traces_lobes`: a free camera traces rays along narrow lobes, which a browser cannot draw. `scene_update`: only for kind "scene_update". */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -519,7 +519,7 @@ export interface FrameHeader {
   kind: "picture" | "highlight" | "scene_update";
   alpha: boolean;
   camera_seq: number | null;
-  previous_error: number | null;
+  free_camera_error: FreeCameraError | null;
   traces_lobes: boolean;
   scene_update: SceneUpdate | null;
   ms: FrameTimes;
@@ -546,13 +546,15 @@ export interface FreeCameraBody {
   arrays: string[];
 }
 
-/** Error of free-camera images, measured in the bake: relative RMS over surfaces, in the scene's default look. */
+/** Error of free-camera images while the camera moves, over surfaces. `delta_e`: mean CIEDE2000 difference of the displayed images, about 1 is just noticeable; `rms`: relative RMS error of linear radiance. Standard errors: of estimates; null for one whole image. */
 export interface FreeCameraError {
-  value: number;
-  standard_error: number;
+  delta_e: number;
+  rms: number;
+  delta_e_standard_error: number | null;
+  rms_standard_error: number | null;
 }
 
-/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, otherwise 0 and null. `visible_views`: views whose frames are sent, `focused_view` one of them; `views`: all baked views. `method`: of the bake; `axes`: what edits can change. `role`: with `view` no edits are accepted. `room`: the shared room, null if there is none. `free_camera_error`: null without a free camera, and if it could not be measured. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, otherwise 0 and null. `visible_views`: views whose frames are sent, `focused_view` one of them; `views`: all baked views. `method`: of the bake; `axes`: what edits can change. `role`: with `view` no edits are accepted. `room`: the shared room, null if there is none. `free_camera_error`: measured in the bake, in the scene's default look; null without a free camera, and if it could not be measured. */
 export interface HelloMessage {
   type: "hello";
   session: string;

@@ -20,6 +20,7 @@ export type {
   ImageBody,
   ViewportBody,
   FrameHeader,
+  FreeCameraError,
   HelloMessage,
   AlbedoBody,
   ZernikeFitBody,

@@ -18,7 +18,7 @@ export function onePixel(view: string, complete: boolean, at = 0, width = 1): Fr
       kind: "picture",
       alpha: false,
       camera_seq: null,
-      previous_error: null,
+      free_camera_error: null,
       traces_lobes: false,
       scene_update: null,
       ms: { wait: 0, update: 0, encode: 0 },

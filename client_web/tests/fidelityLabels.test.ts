@@ -21,12 +21,13 @@ const labels = () => fidelityMarks().map((mark) => mark.label);
 test("before the first camera stop, the error is the one measured in the bake", () => {
   [bakedFreeCameraError.value, freeCameraError.value] = [null, null];
   expect(labels()).toContain("Approximate while moving");
-  bakedFreeCameraError.value = { value: 0.0312, standard_error: 0.0021 };
-  expect(labels()).toContain("Approximate while moving (about 3.1 % error)");
-  expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
-  freeCameraError.value = 0.217;
-  expect(labels()).toContain("Approximate while moving (about 22 % error)");
-  expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
+  bakedFreeCameraError.value = { delta_e: 0.93, rms: 2.27, delta_e_standard_error: 0.1, rms_standard_error: 0.2 };
+  expect(labels()).toContain("Approximate while moving: difference hardly visible");
+  expect(fidelityMarks()[0]?.title).toContain("ΔE 0.9; 227 % RMS error of linear radiance");
+  freeCameraError.value = { delta_e: 3.4, rms: 0.217, delta_e_standard_error: null, rms_standard_error: null };
+  expect(labels()).toContain("Approximate while moving: difference visible at a glance");
+  expect(fidelityMarks()[0]?.title).toContain("ΔE 3.4; 22 % RMS");
+  expect(fidelityMarks()[0]?.title).toContain("ΔE 0.9; 227 % RMS");
 });
 
 test("the label says that the timeline plays", () => {

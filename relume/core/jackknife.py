@@ -18,6 +18,16 @@ class JackknifeEstimate(NamedTuple):
     standard_error: float
 
 
+def ratio_of_parts(numerators: Shaped[F64, " n"], denominators: Shaped[F64, " n"]) -> JackknifeEstimate:
+    """Ratio Σ numerators / Σ denominators over randomly drawn parts, such as a mean.
+
+    Args:
+        numerators, denominators: as for `rms_of_parts`.
+    """
+    without = (numerators.sum() - numerators) / (denominators.sum() - denominators)
+    return JackknifeEstimate(float(numerators.sum() / denominators.sum()), jackknife(without))
+
+
 def rms_of_parts(numerators: Shaped[F64, " n"], denominators: Shaped[F64, " n"]) -> JackknifeEstimate:
     """Ratio √(Σ numerators / Σ denominators) over randomly drawn parts, such as a relative RMSE.
 

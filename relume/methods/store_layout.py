@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
@@ -76,12 +78,25 @@ def read_alpha_test(
     return AlphaTest.build(faces, positions, uvs, material, alpha_masks)
 
 
-def read_free_camera_error(store: StoreReader) -> JackknifeEstimate | None:
-    """Read the relative RMS error of free-camera images; None if unknown, as for bakes of earlier versions."""
-    if not store.attributes.get("has_free_camera_error"):
+class BakedError(NamedTuple):
+    """Error of free-camera images, estimated by a bake in the scene's default look.
+
+    Attributes:
+        delta_e, rms: as in `relume.live.fixed_camera.fidelity.ImageError`.
+    """
+
+    delta_e: JackknifeEstimate
+    rms: JackknifeEstimate
+
+
+def read_free_camera_error(store: StoreReader) -> BakedError | None:
+    """Read the error of free-camera images; None if unknown, as for bakes of earlier versions."""
+    if not store.attributes.get("has_free_camera_error") or store.shape(FREE_CAMERA_ERROR) != (2, 2):
         return None
-    error, standard_error = store.read(FREE_CAMERA_ERROR).tolist()
-    return JackknifeEstimate(error, standard_error) if np.isfinite([error, standard_error]).all() else None
+    estimates = store.read(FREE_CAMERA_ERROR)
+    if not np.isfinite(estimates).all():
+        return None
+    return BakedError(*(JackknifeEstimate(*row) for row in estimates.tolist()))
 
 
 def read_rays(store: StoreReader) -> RayCounts:

@@ -3,13 +3,15 @@
 import json
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from relume_bench import registry, table
+from relume_bench import load, registry, table
 from relume_bench.figure import Figure
 from relume_bench.machine import measure_stolen_fraction
+from relume_bench.measured_code import collect_sources, measured_code
 from relume_bench.mitsuba import map_for_mitsuba
 
 FIXED_NAMES = {
@@ -30,7 +32,7 @@ LONG = [
     "gather_error", "gather_full", "gather_scenes", "peer_gather", "lights",
     "memory", "gather_interior", "gather_lights", "ray_saving", "gather",
     "gather_incremental", "glass", "roughness_maps", "mirror", "probes", "probes_edits",
-    "probes_reference", "canvas_free_camera", "btf", "btf_accuracy", "btf_speed", "load",
+    "probes_reference", "free_camera_accuracy", "canvas_free_camera", "btf", "btf_accuracy", "btf_speed", "load",
     "btf_edit", "many_sessions", "refusal", "slider_drag", "probes_static_view", "rotation",
     "btf_several", "plan_disk", "probes_live", "probes_error", "assets",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
@@ -166,11 +168,45 @@ def test_estimate_is_shown_with_its_standard_error() -> None:
 def test_tables_show_the_stored_figures(name: str) -> None:
     figures = json.loads((table.DOCS / f"{name}.json").read_text())
     text = (table.DOCS / f"{name}.md").read_text()
-    assert table.filled(text, figures) == text
+    assert table.filled(text, figures) == text.replace(table.OLDER, "")  # what is older changes with each commit
     assert {figure["name"] for figure in figures} <= set(registry.names())
-    for figure in figures:
-        measured_on = figure["context"].get("measured_on", "")
-        assert figure["value"] is None or re.fullmatch(r"\d{4}-\d\d-\d\d, schema \d+", measured_on), figure["name"]
+
+
+@pytest.mark.parametrize("name", table.PAGES)
+def test_rows_are_those_that_the_benchmarks_wrote(name: str) -> None:
+    """A row has what `Group.measure` adds to every figure; the hash of the code since there is one."""
+    for figure in json.loads((table.DOCS / f"{name}.json").read_text()):
+        context = figure["context"]
+        assert {"measured_in_s", "stolen_share", "measured_on"} <= set(context), figure["name"]
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d, schema \d+", context["measured_on"]), figure["name"]
+        if context["measured_on"] > "2026-11-30":
+            assert re.fullmatch(r"[0-9a-f]{16}", context["code"]), figure["name"]
+
+
+def test_figures_older_than_their_code_are_listed_and_marked() -> None:
+    (group,) = groups_of("bandwidth")
+    (new,) = group.names
+    stored = {
+        name: {
+            "name": name,
+            "value": 1.0,
+            "unit": "s",
+            "context": {"measured_on": "2026-12-01, schema 8", "code": code},
+        }
+        for name, code in ((new, measured_code(group.module)), ("shade.vs_operator_sums", "0" * 16))
+    }
+    older = registry.find_older(stored)
+    assert set(registry.names()) - set(older) == {new}  # the others have other code, or no row
+    page = table.filled(f"{table.BEGIN}\n{table.END}", list(stored.values()), older)
+    assert [line.endswith(f"{table.OLDER} |") for line in page.splitlines() if "| `" in line] == [False, True]
+
+
+def test_code_of_a_figure_is_that_of_all_imports() -> None:
+    codes = {group.module: measured_code(group.module) for group in registry.GROUPS}
+    assert len(set(codes.values())) == len(codes)
+    names = {f"{path.parent.name}/{path.stem}" for path in collect_sources(Path(load.__file__))}
+    assert {"relume_bench/load", "relume_bench/baked_server", "store/bake_protocol"} <= names
+    assert "relume_bench/glass" not in names
 
 
 def test_figure_without_a_value_has_a_reason() -> None:

@@ -112,6 +112,7 @@ def make_group(monkeypatch: pytest.MonkeyPatch, *figures: Figure, is_quick: bool
     name = f"measured_{figures[0].name.replace('.', '_')}"
     module = ModuleType(name)
     module.measure = lambda tiny: list(figures)  # type: ignore[attr-defined]
+    monkeypatch.setattr(registry, "measured_code", lambda module: "0" * 16)
     monkeypatch.setitem(sys.modules, name, module)
     return registry.Group(name, tuple(figure.name for figure in figures), is_quick)
 

@@ -143,7 +143,7 @@ def fake_job(
 def make_advance(tiles: list[Any], exact: bool) -> SimpleNamespace:
     """The result of a step of a whole picture."""
     fidelity = Fidelity.EXACT if exact else Fidelity.APPROXIMATE
-    fields = {"exact": exact, "fidelity": fidelity, "complete": True, "previous_error": None, "traces_lobes": False}
+    fields = {"exact": exact, "fidelity": fidelity, "complete": True, "free_camera_error": None, "traces_lobes": False}
     return SimpleNamespace(tiles=tiles, changed=bool(tiles), **fields)
 
 

@@ -113,7 +113,9 @@ def test_hello_describes_the_free_camera_and_the_scene_bounds(session: Session) 
     assert (view["camera_mode"], first_view["method"], "camera" in first_view["axes"]) == ("free", "probes", True)
     lowest, highest = np.array(view["bounds"])
     np.testing.assert_allclose([lowest, highest], [[-1] * 3, [1] * 3], atol=0.05)
-    assert 0 < first_view["free_camera_error"]["standard_error"] < first_view["free_camera_error"]["value"] < 0.5
+    error = first_view["free_camera_error"]
+    assert 0 < error["rms_standard_error"] < error["rms"] < 0.5
+    assert 0 < error["delta_e_standard_error"] < error["delta_e"] < 20
 
 
 def test_frames_follow_the_camera_and_name_its_sequence_number(session: Session) -> None:

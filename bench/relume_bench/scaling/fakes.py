@@ -204,7 +204,7 @@ class _Picture:
         if self.is_due:
             burn(self.frame_s)
         self.is_due = False
-        state = {"exact": True, "fidelity": Fidelity.EXACT, "complete": True, "previous_error": None}
+        state = {"exact": True, "fidelity": Fidelity.EXACT, "complete": True, "free_camera_error": None}
         return SimpleNamespace(tiles=tiles, changed=bool(tiles), **state)
 
     def all_tiles(self) -> list[tuple[int, int, int, int]]:

@@ -5,29 +5,19 @@ import { exporting, exportText } from "../panels/looks/renderJob";
 import { cancelBake } from "../session/net/api";
 import { bakeProgressText, hasProgress, useElapsedSeconds } from "../session/scene/bakeStatus";
 import { activeFilters } from "../state/visibility/activeFilters";
-import { pendingBake, method } from "../state/bakes";
+import { pendingBake } from "../state/bakes";
 import { connection, freezeStatus, retryInMs } from "../state/connection";
 import { isConverged } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
-import { usesBakedEnvironment, look } from "../state/look";
+import { look } from "../state/look";
 import { shownPanels } from "../state/panelWidths";
 import { membersText } from "../state/collaboration";
-import { hasFreeCamera } from "../state/views";
-import { isPlaying } from "../panels/timeline/playback";
 import { toggleComparison } from "../panels/compare/comparison";
 import { formatBytes } from "../ui/scale";
 import { reportErrors } from "../ui/toasts";
 import { connectionMessage } from "./connectionMessages";
+import { imageStatusText } from "./imageStatus";
 import { useCacheGauge } from "./useCacheGauge";
-
-function imageStatusText(): string {
-  if (freezeStatus.value?.state === "shading") return `Updating ${freezeStatus.value.label}…`;
-  if (freezeStatus.value !== null) return `Preparing ${freezeStatus.value.label}…`;
-  if (look.value === null || connection.value !== "open") return "";
-  if (!isConverged.value && isPlaying.value) return "Playing";
-  if (!isConverged.value) return hasFreeCamera.value ? "Approximate while the camera moves" : "Refining…";
-  return usesBakedEnvironment.value && method.value !== "direct" ? "Exact ✓" : "Exact (this bake) ✓";
-}
 
 function bakeStatusText(elapsed: number): string {
   const next = pendingBake.value;
@@ -44,7 +34,7 @@ export function StatusBar() {
   const announced = useComputed(() =>
     [
       connection.value === "open" ? "Connected" : connectionMessage(),
-      freezeStatus.value && imageStatusText(),
+      freezeStatus.value && imageStatusText.value,
       membersText.value,
       ...activeFilters.value.map((limit) => limit.label),
     ]
@@ -64,7 +54,7 @@ export function StatusBar() {
       <span class="latency" title="From input to the drawn frame">
         Latency {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
-      <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText()}</span>
+      <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText.value}</span>
       <button
         aria-pressed={shownPanels.value.includes("comparison")}
         title="Measure this picture’s error against path tracing"
@@ -74,7 +64,7 @@ export function StatusBar() {
         Compare with reference
       </button>
       {freezeStatus.value !== null && (
-        <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText()} />
+        <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText.value} />
       )}
       <span class="spacer" />
       {exporting.value !== null && (

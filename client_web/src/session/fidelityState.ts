@@ -26,7 +26,7 @@ export function recordShownFrame(bakeConnection: BakeConnection, header: FrameHe
   image.exactRevision = header.exact ? header.revision : -1;
   image.exactShared = header.exact ? header.room_revision : -1;
   image.fidelity = header.fidelity;
-  if (header.previous_error !== null) freeCameraError.value = header.previous_error;
+  if (header.free_camera_error !== null) freeCameraError.value = header.free_camera_error;
   updateFidelity();
   updateExactness(bakeConnection);
 }

@@ -1,6 +1,6 @@
 /** Fidelity of the shown images. */
 import { effect, signal } from "@preact/signals";
-import { FIDELITIES, type Fidelity, type HelloMessage } from "../protocol";
+import { FIDELITIES, type Fidelity, type FreeCameraError } from "../protocol";
 
 /** True if every shown image is exact. */
 export const isFrameExact = signal(false);
@@ -11,10 +11,10 @@ export const isConverged = signal(false);
 /** The lowest fidelity of the shown images; exact without images. */
 export const fidelity = signal<Fidelity>("exact");
 
-/** Relative RMS error of the free-camera image at the last camera stop; null before. */
-export const freeCameraError = signal<number | null>(null);
+/** Error of the image while the camera moved, measured at its last stop; null before. */
+export const freeCameraError = signal<FreeCameraError | null>(null);
 /** The error measured during the bake, in the scene's own look; null if unknown. */
-export const bakedFreeCameraError = signal<HelloMessage["free_camera_error"]>(null);
+export const bakedFreeCameraError = signal<FreeCameraError | null>(null);
 
 export function worstFidelity(fidelities: Fidelity[]): Fidelity {
   return FIDELITIES[Math.min(...fidelities.map((each) => FIDELITIES.indexOf(each)), FIDELITIES.length - 1)] as Fidelity;

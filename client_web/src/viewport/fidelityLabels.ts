@@ -1,7 +1,7 @@
 /** Fidelity labels in the image's corner: shown if the image is approximate for a while, so that nothing flickers during
  * a drag. */
 import { computed, effect, signal, untracked } from "@preact/signals";
-import type { Fidelity } from "../protocol";
+import type { Fidelity, FreeCameraError } from "../protocol";
 import { DEFAULT_BAKE_METHOD, methodLabelsOf } from "../session/scene/bakeMethods";
 import { method } from "../state/bakes";
 import { bakedFreeCameraError, fidelity, isOutdated, freeCameraError, isConverged } from "../state/fidelity";
@@ -39,24 +39,35 @@ const PLAYBACK_MARK: FidelityMark = {
 const FREE_CAMERA_REASON = "While the camera moves, fine shadows and sharp highlights are softer.";
 const WHEN_STOPPED = "The exact picture follows when the camera stops.";
 
+/** Mean color differences ΔE up to which a description holds; 1 is just noticeable between patches side by side. */
+const VISIBILITIES: [number, string][] = [
+  [1, "hardly visible"],
+  [2, "visible up close"],
+  [10, "visible at a glance"],
+  [Infinity, "strong"],
+];
+
 const formatPercent = (fraction: number) =>
   fraction < 0.095 ? (100 * fraction).toFixed(1) : `${Math.round(100 * fraction)}`;
 
+const describe = (delta: number) => VISIBILITIES.find(([limit]) => delta <= limit)?.[1] ?? "strong";
+
+const errorText = ({ delta_e: delta, rms }: FreeCameraError) =>
+  `color difference ΔE ${delta.toFixed(1)}; ${formatPercent(rms)} % RMS error of linear radiance`;
+
 /** Label with the error at the last camera stop, else as measured in the bake. */
 function freeCameraMark(): FidelityMark {
-  const [errorWhenStopped, baked] = [freeCameraError.value, bakedFreeCameraError.value];
-  const error = errorWhenStopped ?? baked?.value ?? null;
+  const [atStop, baked] = [freeCameraError.value, bakedFreeCameraError.value];
+  const error = atStop ?? baked;
   if (error === null) return { label: "Approximate while moving", title: `${FREE_CAMERA_REASON} ${WHEN_STOPPED}` };
-  const measured =
-    baked === null
-      ? ""
-      : ` Error in the original look: ${formatPercent(baked.value)} ± ${formatPercent(baked.standard_error)} % RMS (surfaces only).`;
-  const idleError =
-    errorWhenStopped === null ? "" : ` Error at the last stop: ${formatPercent(errorWhenStopped)} % RMS.`;
-  return {
-    label: `Approximate while moving (about ${formatPercent(error)} % error)`,
-    title: `${FREE_CAMERA_REASON}${measured}${idleError} ${WHEN_STOPPED}`,
-  };
+  const sentences = [
+    FREE_CAMERA_REASON,
+    "Average over surfaces, where ΔE 1 is just noticeable.",
+    ...(atStop === null ? [] : [`At the last stop: ${errorText(atStop)}.`]),
+    ...(baked === null ? [] : [`In the original look: ${errorText(baked)}.`]),
+    WHEN_STOPPED,
+  ];
+  return { label: `Approximate while moving: difference ${describe(error.delta_e)}`, title: sentences.join(" ") };
 }
 
 const SHOWN_AFTER_MS = 300;

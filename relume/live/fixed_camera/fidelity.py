@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import NamedTuple
 
 
 class Fidelity(StrEnum):
@@ -16,8 +17,8 @@ class Fidelity(StrEnum):
       within a thousandth (relative RMS).
     - EXACT: the complete sum over all light that was baked.
 
-    Everything below EXACT is replaced when nobody edits. One number goes with it: the error that the replaced image
-    had, if it was measured (`previous_error`).
+    Everything below EXACT is replaced when nobody edits. The first exact image after a free camera stopped comes with
+    the error of the image that was shown while it moved (`free_camera_error`).
     """
 
     PREVIEW = "preview"
@@ -40,3 +41,14 @@ class Fidelity(StrEnum):
 
 
 _ORDER: tuple[str, ...] = tuple(Fidelity)
+
+
+class ImageError(NamedTuple):
+    """Error of an approximate image against the exact one, over surfaces.
+
+    Attributes:
+        delta_e: mean CIEDE2000 difference of the displayed images. rms: relative RMS error of linear radiance.
+    """
+
+    delta_e: float
+    rms: float

@@ -17,7 +17,7 @@ from relume.core.errors import CancelledError, ParameterError
 from relume.live.fixed_camera.background import Background
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
 from relume.live.fixed_camera.edited_glass import EditedGlass, TracedView
-from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.fidelity import Fidelity, ImageError
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, ProgressCallback
 from relume.live.fixed_camera.pixel_probe import highlight_pixels, probe
@@ -41,7 +41,7 @@ class Progress:
     Attributes:
         tiles: x, y, width, height of the updated tiles. exact: the picture shows its look exactly.
         fidelity: fidelity of the visible region. complete: every term has an image.
-        previous_error: relative RMS difference of an exact image from the image it replaces, for a free camera.
+        free_camera_error: error of the image of the moving camera, with the first exact image that replaces it.
         traces_lobes: a free camera traces rays along narrow lobes, which a browser cannot draw.
     """
 
@@ -49,7 +49,7 @@ class Progress:
     exact: bool
     fidelity: Fidelity
     complete: bool
-    previous_error: float | None = None
+    free_camera_error: ImageError | None = None
     traces_lobes: bool = False
 
     @property

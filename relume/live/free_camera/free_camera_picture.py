@@ -146,6 +146,9 @@ class FreeCameraPicture:
         """Return a new picture of the same camera, with all of its light and fine highlights."""
         picture = FreeCameraPicture(self._transfer, next(iter(self._transfer.views)))
         picture.set_camera(self._camera, self._size)
+        if self._gbuffer is not None and self._gbuffer[0] == self._camera_seq:
+            picture._gbuffer = picture._camera_seq, self._gbuffer[1]
+        picture._lobe_scenes = self._lobe_scenes
         return picture
 
     @property
@@ -392,6 +395,18 @@ class FreeCameraPicture:
         args = self._transfer.occlusion_mesh, gbuffer, self._camera, size
         shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
         return render_frame(self._transfer, state, gbuffer, self._camera, size, shadow_visibility).image, gbuffer
+
+    def render_moving(self) -> tuple[Shaped[F32, "height width 3"], GBuffer]:
+        """Render the image of a moving camera anew: without fine highlights, and without a residual.
+
+        Returns:
+            Linear radiance, float32, and the G-buffer.
+        """
+        assert self._look is not None
+        gbuffer = self._current_gbuffer()
+        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=False)
+        shadow_visibility = self._trace_shadow_visibility(state.incident.hard_shadow_lights, gbuffer)
+        return render_frame(self._transfer, state, gbuffer, self._camera, self._size, shadow_visibility).image, gbuffer
 
     @property
     def stored_scene(self) -> StoredScene:

@@ -60,6 +60,12 @@ class GBuffer(NamedTuple):
         pixel = np.concatenate([np.arange(num_pixels, dtype=np.int32), self.owner])
         return np.concatenate([pixel, pixel[self.glass.ray]])
 
+    def shows_surface(self, num_pixels: int) -> NDArray[np.bool_]:
+        """Return whether the center of each pixel shows a surface or glass. num_pixels: number of pixels"""
+        is_surface = self.hits.face[:num_pixels] >= 0
+        is_surface[self.glass.ray[self.glass.ray < num_pixels]] = True
+        return is_surface
+
     def with_glass_rules(
         self, stored_scene: StoredScene, embree: EmbreeScene, rules: Shaped[F32, "images 6"]
     ) -> GBuffer:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
-from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.fidelity import ImageError
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import Job
 from relume.live.fixed_camera.picture import Picture, Progress
@@ -25,6 +25,7 @@ from relume.live.fixed_camera.protocols import StaticViewFactory
 from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.static_view_jobs import (
+    ExactImage,
     SizedCamera,
     StaticViewState,
     correction_job,
@@ -54,6 +55,7 @@ class ProgressivePicture:
         self._corrected_for: tuple[int, int] | None = None  # camera and look that were corrected
         self._static_picture: Picture | None = None
         self._has_indirect = False  # of the static view
+        self._moving_error: ImageError | None = None  # of the image that the static view replaces
         self._is_static = False  # the static view is displayed
         self._must_resend = False  # the camera was set again to the same pose
         self._look: Look | None = None
@@ -137,22 +139,23 @@ class ProgressivePicture:
             self._make_static_view, self._cache, self._free_camera_picture.sized_camera, self._look, self._solo
         )
         request = self._camera_seq, self._look_seq
+        unwatched = self._free_camera_picture.unwatched()
         if self._corrected_for != request and should_correct(self._look):
-            unwatched = self._free_camera_picture.unwatched()
             return correction_job(view_state, unwatched, request, partial(self._correct, request))
-        return static_view_job(view_state, request, partial(self._set_static_picture, self._camera_seq))
+        return static_view_job(view_state, unwatched, request, partial(self._set_static_picture, self._camera_seq))
 
     def _correct(self, request: tuple[int, int], residual_image: F32 | None) -> None:
         if request == (self._camera_seq, self._look_seq):  # else the camera or the look has changed
             self._corrected_for = request
             self._free_camera_picture.correct(residual_image)
 
-    def _set_static_picture(self, camera_seq: int, has_indirect: bool, static_picture: Picture | None) -> None:
+    def _set_static_picture(self, camera_seq: int, has_indirect: bool, result: ExactImage | None) -> None:
         if camera_seq != self._camera_seq or self._look is None:
             return
-        if static_picture is None:
+        if result is None:
             self._is_idle = False
             return
+        static_picture, self._moving_error = result
         if _has_indirect(self._look) and not has_indirect:  # requested meanwhile; the next job reuses the traced view
             return
         static_picture.set_look(self._look, active_pointer=self._active_pointer, solo=self._solo)
@@ -178,18 +181,7 @@ class ProgressivePicture:
         if not step.exact:
             return self._free_camera_picture.advance(max_coefficients)
         self._is_static = True
-        return replace(
-            step, tiles=self._static_picture.all_tiles(), previous_error=self._relative_error(self._static_picture)
-        )
-
-    def _relative_error(self, static_picture: Picture) -> float | None:
-        """Relative RMSE of the free-camera image against the static view; None if it lags behind, or all is dark."""
-        self._free_camera_picture.correct(None)
-        if self._free_camera_picture.advance(None).fidelity != Fidelity.APPROXIMATE:
-            return None
-        exact = static_picture.image()
-        size = float(np.mean(np.square(exact, dtype=np.float64)))
-        return float(np.sqrt(np.mean((self._free_camera_picture.image() - exact) ** 2) / size)) if size else None
+        return replace(step, tiles=self._static_picture.all_tiles(), free_camera_error=self._moving_error)
 
     def all_tiles(self) -> list[Tile]:
         """Tiles that cover the image."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -19,12 +20,14 @@ from numpy.typing import NDArray
 from relume.brdf.specular import is_mirror
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, RelumeError, ResultUnavailableError
+from relume.live.fixed_camera.fidelity import ImageError
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.fixed_camera.protocols import StaticViewFactory
 from relume.live.fixed_camera.view_images import material_documents
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.image_error import pixel_errors
 from relume.live.free_camera.lobe_terms import has_traced_lobe
 from relume.look import Look
 from relume.look.glass import glass_of
@@ -147,27 +150,45 @@ def _is_sharp(look: Look, name: str) -> bool:
     return is_mirror(terms) or has_traced_lobe(terms)
 
 
+class ExactImage(NamedTuple):
+    """Result of `static_view_job`.
+
+    Attributes:
+        picture: the static view. error: of the image of the moving camera, in the same look; None if all is black.
+    """
+
+    picture: Picture
+    error: ImageError | None
+
+
 def static_view_job(
-    view_state: StaticViewState, key: tuple[int, int], apply: Callable[[bool, Picture | None], None]
+    view_state: StaticViewState,
+    free_camera_picture: FreeCameraPicture,
+    key: tuple[int, int],
+    apply: Callable[[bool, ExactImage | None], None],
 ) -> Job:
     """Return the job that renders the exact image of a stopped camera.
 
     Args:
         view_state: the target; the result continues with looks that were set meanwhile.
+        free_camera_picture: another picture of its camera, for this job alone.
         key: equal for jobs of one camera and look, so that edits replace it.
-        apply: receives whether indirect light was traced, and the picture, or None if it is not available.
+        apply: receives whether indirect light was traced, and the result, or None if it is not available.
     """
     label = "the exact image of this camera"
 
-    def run(progress: ProgressCallback, is_canceled: CancelCheck) -> Picture | ResultUnavailableError:
+    def run(progress: ProgressCallback, is_canceled: CancelCheck) -> ExactImage | ResultUnavailableError:
         try:
-            return view_state.static_picture(progress, is_canceled)
+            picture = view_state.static_picture(progress, is_canceled)
         except CancelledError:
             raise
         except RelumeError as error:  # the scene is gone, or it needs more memory than there is
             return ResultUnavailableError(f"{label} is not available: {error}")
+        free_camera_picture.set_look(view_state.look, solo=view_state.solo)
+        image, gbuffer = free_camera_picture.render_moving()
+        return ExactImage(picture, pixel_errors(image, picture.image(), gbuffer, view_state.look.display).sum())
 
-    def apply_result(result: Picture | ResultUnavailableError) -> None:
+    def apply_result(result: ExactImage | ResultUnavailableError) -> None:
         apply(view_state.is_indirect, None if isinstance(result, ResultUnavailableError) else result)
 
     return Job(("static view", *key), label, Priority.REFINEMENT, run, apply_result)

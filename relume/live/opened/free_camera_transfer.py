@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import EmissionImage
 from relume.core.cache import Cache
-from relume.core.jackknife import JackknifeEstimate
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment
 from relume.live.fixed_camera.jobs import CancelCheck
@@ -37,7 +36,7 @@ from relume.look.glass import GlassOfLook
 from relume.look.model import Rgb
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
 from relume.methods.mirror_lights import read_mirror_lights
-from relume.methods.store_layout import read_free_camera_error
+from relume.methods.store_layout import BakedError, read_free_camera_error
 from relume.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import RayPattern
@@ -71,7 +70,7 @@ class BakedFreeCamera:
     light_transport: BakedIndirectViews
     stored_scene: StoredScene
     views: dict[str, FreeView]
-    free_camera_error: JackknifeEstimate | None = None
+    free_camera_error: BakedError | None = None
 
     camera_mode = CameraMode.FREE
     axes = BakedIndirectViews.axes | {EditAxis.CAMERA}

@@ -229,10 +229,15 @@ class ViewInfo(Message):
 
 
 class FreeCameraError(Message):
-    """Error of free-camera images, measured in the bake: relative RMS over surfaces, in the scene's default look."""
+    """Error of free-camera images while the camera moves, over surfaces. `delta_e`: mean CIEDE2000 difference of the
+    displayed images, about 1 is just noticeable; `rms`: relative RMS error of linear radiance. Standard errors: of
+    estimates; null for one whole image.
+    """
 
-    value: float
-    standard_error: float
+    delta_e: float
+    rms: float
+    delta_e_standard_error: float | None = None
+    rms_standard_error: float | None = None
 
 
 class HelloMessage(Message):
@@ -241,7 +246,8 @@ class HelloMessage(Message):
 
     `visible_views`: views whose frames are sent, `focused_view` one of them; `views`: all baked views. `method`: of the
     bake; `axes`: what edits can change. `role`: with `view` no edits are accepted. `room`: the shared room, null if
-    there is none. `free_camera_error`: null without a free camera, and if it could not be measured.
+    there is none. `free_camera_error`: measured in the bake, in the scene's default look; null without a
+    free camera, and if it could not be measured.
     """
 
     type: Literal["hello"] = "hello"
@@ -380,9 +386,9 @@ class SceneUpdate(Message):
 class FrameHeader(Message):
     """Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera
     that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact;
-    `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after
-    the camera stopped: error of the approximate image before it, relative RMS. `traces_lobes`: a free camera traces
-    rays along narrow lobes, which a browser cannot draw. `scene_update`: only for kind "scene_update".
+    `fidelity`: of its visible region. `complete`: every term is shown. `free_camera_error`: with the first exact frame
+    after the camera stopped: error of the image shown while it moved, without corrections. `traces_lobes`: a free
+    camera traces rays along narrow lobes, which a browser cannot draw. `scene_update`: only for kind "scene_update".
     """
 
     frame: int
@@ -399,7 +405,7 @@ class FrameHeader(Message):
     kind: Literal["picture", "highlight", "scene_update"]
     alpha: bool = False
     camera_seq: int | None = None
-    previous_error: float | None = None
+    free_camera_error: FreeCameraError | None = None
     traces_lobes: bool = False
     scene_update: SceneUpdate | None = None
     ms: FrameTimes

@@ -186,7 +186,14 @@ def _free_camera_error(transfer: OpenBake) -> FreeCameraError | None:
     if transfer.camera_mode is not CameraMode.FREE:
         return None
     error = cast("BakedFreeCamera", transfer).free_camera_error
-    return None if error is None else FreeCameraError(value=error.value, standard_error=error.standard_error)
+    if error is None:
+        return None
+    return FreeCameraError(
+        delta_e=error.delta_e.value,
+        rms=error.rms.value,
+        delta_e_standard_error=error.delta_e.standard_error,
+        rms_standard_error=error.rms.standard_error,
+    )
 
 
 def _view_info(view: CameraView, transfer: OpenBake) -> ViewInfo:

@@ -20,7 +20,7 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look.model import DisplayLook
 from relume_server.client_state.target import CameraState, Target
 from relume_server.runtime.protocols import FixedPicture, FreeCameraPicture, Picture, Tile
-from relume_server.schemas.protocol import ArrayInfo, FrameHeader, FrameTimes, SceneUpdate
+from relume_server.schemas.protocol import ArrayInfo, FrameHeader, FrameTimes, FreeCameraError, SceneUpdate
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
@@ -187,6 +187,7 @@ def _waited_ms(request: FrameRequest, start_s: float) -> float:
 
 
 def _header(request: FrameRequest, progress: Progress, ms: FrameTimes, fields: Mapping[str, Any]) -> FrameHeader:
+    error = progress.free_camera_error
     return FrameHeader(
         frame=request.frame,
         revision=request.target.revision,
@@ -197,7 +198,7 @@ def _header(request: FrameRequest, progress: Progress, ms: FrameTimes, fields: M
         fidelity=progress.fidelity,
         complete=progress.complete,
         camera_seq=request.camera_seq,
-        previous_error=progress.previous_error,
+        free_camera_error=None if error is None else FreeCameraError(delta_e=error.delta_e, rms=error.rms),
         traces_lobes=progress.traces_lobes,
         ms=ms,
         **fields,
