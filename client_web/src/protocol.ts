@@ -35,6 +35,8 @@ export type {
   Person,
   PlanBody,
   InspectAnswer,
+  PathAnswer,
+  PathBody,
   Problem,
   ProblemMessage,
   RenderBody,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
@@ -103,9 +102,7 @@ def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame
         raise ParameterError("view", None, "the view of the path")
     baked_view(request.view, transfer)
     cameras = [camera for camera in check_animation(request, request.view, transfer) if camera is not None]
-    return [
-        CameraFrame(to_world=camera.to_world.ravel().tolist(), yfov=math.degrees(camera.yfov)) for camera in cameras
-    ] or None
+    return [CameraFrame.from_camera(camera) for camera in cameras] or None
 
 
 def _check_looks(request: Keyframes, transfer: OpenBake) -> None:

@@ -13,7 +13,6 @@ from relume.live.fixed_camera.protocols import CameraMode, CameraView, OpenBake
 from relume.look import Look
 from relume.look.interpolate import enclosing_keyframes, interpolate_looks
 from relume.look.rotate import rotated_environment, rotated_lights
-from relume.scene.custom_camera import make_custom_camera
 from relume_server.schemas.bodies import ComparisonRequest
 from relume_server.schemas.cameras import CameraFrame
 from relume_server.schemas.renders import Animation, CameraPath, Keyframes, LooksRequest, Turntable
@@ -75,7 +74,7 @@ def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Ca
 
 
 def _camera_of_frame(view: CameraView, frame: CameraFrame) -> Camera:
-    return make_custom_camera(view.name, frame.to_world, frame.yfov).camera
+    return frame.custom_camera(view.name).camera
 
 
 def comparison_camera(request: ComparisonRequest, transfer: OpenBake) -> tuple[Camera, tuple[int, int]]:
