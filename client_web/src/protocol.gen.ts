@@ -727,19 +727,21 @@ export interface ParameterBody {
   requires_new_operator: boolean;
 }
 
-/** server → client: `length` of a path to its first surface, meters, and the material there; null if it is free. `solid`: material of the closed surface that its last point is in, as inside a wall; null in rooms and in the open. */
+/** server → client: `length` of a path to its first surface, meters, with its material and unit normal; null if the path is free. `solid`: material of the closed surface that its last point is in, as inside a wall; null in rooms and in the open. */
 export interface PathAnswer {
   type: "path";
   id: number;
   length: number | null;
   material: string | null;
+  normal: [number, number, number] | null;
   solid: string | null;
 }
 
-/** The first surface on a path: `length` of the path to it, meters, and its material; null if the path is free. */
+/** The first surface on a path: `length` of the path to it, meters, its material and unit normal; null if it is free. */
 export interface PathBody {
   length: number | null;
   material: string | null;
+  normal: [number, number, number] | null;
 }
 
 /** A participant. `id`: constant while in the room. `online`: false while the connection is lost. */

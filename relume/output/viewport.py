@@ -107,16 +107,19 @@ class Viewport:
             return None
         return np.asarray(camera.to_world[:3, 3] + float(hits.distance[0]) * directions[0].astype(np.float64))
 
-    def first_obstacle(self, path: Sequence[Sequence[float]]) -> tuple[float | None, str | None]:
-        """Return the length of a path to its first surface, meters, and the material there; None if it is free.
+    def first_obstacle(
+        self, path: Sequence[Sequence[float]]
+    ) -> tuple[float | None, str | None, tuple[float, float, float] | None]:
+        """Return the length of a path to its first surface, meters, its material and unit normal; None if it is free.
 
         Args:
             path: corners of a polyline, meters.
         """
         obstacle = first_obstacle(self.geometry.embree, np.array(path, np.float64), self.geometry.epsilon)
         if obstacle is None:
-            return None, None
-        return obstacle.length, self.material_names[int(self.geometry.face_material[obstacle.face])]
+            return None, None, None
+        x, y, z = self.geometry.face_normals[obstacle.face].tolist()
+        return obstacle.length, self.material_names[int(self.geometry.face_material[obstacle.face])], (x, y, z)
 
     def _trace(self, camera: Camera, directions: F32) -> Hits:
         position, start = camera.to_world[:3, 3].astype(np.float32), near_distances(camera, directions)

@@ -6,13 +6,13 @@ import { cancelBake } from "../session/net/api";
 import { bakeProgressText, hasProgress, useElapsedSeconds } from "../session/scene/bakeStatus";
 import { activeFilters } from "../state/visibility/activeFilters";
 import { pendingBake, method } from "../state/bakes";
+import { isCameraMoving } from "../state/cameras";
 import { connection, freezeStatus, retryInMs } from "../state/connection";
 import { isConverged } from "../state/fidelity";
 import { latencyMs } from "../state/latency";
 import { usesBakedEnvironment, look } from "../state/look";
 import { shownPanels } from "../state/panelWidths";
 import { membersText } from "../state/collaboration";
-import { hasFreeCamera } from "../state/views";
 import { isPlaying } from "../panels/timeline/playback";
 import { toggleComparison } from "../panels/compare/comparison";
 import { formatBytes } from "../ui/scale";
@@ -25,7 +25,8 @@ function imageStatusText(): string {
   if (freezeStatus.value !== null) return `Preparing ${freezeStatus.value.label}…`;
   if (look.value === null || connection.value !== "open") return "";
   if (!isConverged.value && isPlaying.value) return "Playing";
-  if (!isConverged.value) return hasFreeCamera.value ? "Approximate while the camera moves" : "Refining…";
+  if (!isConverged.value && isCameraMoving.value) return "Approximate while the camera moves";
+  if (!isConverged.value) return "Refining…";
   return usesBakedEnvironment.value && method.value !== "direct" ? "Exact ✓" : "Exact (this bake) ✓";
 }
 

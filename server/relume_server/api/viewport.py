@@ -73,8 +73,8 @@ async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBo
 async def first_obstacle(scene: Id, path: PathRequest, services: ServicesDep) -> PathBody:
     """First surface on a path, which stops a camera."""
     viewport = await _open_viewport(scene, services)
-    length, material = await run_in_threadpool(viewport.first_obstacle, path.points)
-    return PathBody(length=length, material=material)
+    length, material, normal = await run_in_threadpool(viewport.first_obstacle, path.points)
+    return PathBody(length=length, material=material, normal=normal)
 
 
 async def _open_viewport(scene: str, services: Services) -> PlacementViewport:

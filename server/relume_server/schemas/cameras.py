@@ -70,10 +70,11 @@ class PathRequest(Body):
 
 
 class PathBody(Body):
-    """The first surface on a path: `length` of the path to it, meters, and its material; null if the path is free."""
+    """The first surface on a path: path `length` to it, meters, its material and unit normal; null without one."""
 
     length: float | None
     material: str | None
+    normal: tuple[float, float, float] | None
 
 
 class ViewportRequest(CameraFrame):

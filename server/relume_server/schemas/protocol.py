@@ -318,7 +318,8 @@ class InspectAnswer(Message):
 
 
 class PathAnswer(Message):
-    """server → client: `length` of a path to its first surface, meters, and the material there; null if it is free.
+    """server → client: `length` of a path to its first surface, meters, with its material and unit normal; null if the
+    path is free.
 
     `solid`: material of the closed surface that its last point is in, as inside a wall; null in rooms and in the open.
     """
@@ -327,6 +328,7 @@ class PathAnswer(Message):
     id: Revision
     length: float | None
     material: str | None
+    normal: tuple[float, float, float] | None
     solid: str | None
 
 

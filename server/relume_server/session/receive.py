@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from starlette.websockets import WebSocket
 
 from relume.core.errors import ParameterError, ProtocolError, RelumeError
@@ -159,10 +160,12 @@ class MessageReceiver:
             raise ParameterError("path", message.id, "a path in a bake with a free camera")
         transfer, path = cast("FreeCameraTransfer", self._transfer), np.array(message.points, np.float64)
         obstacle, surroundings = transfer.first_obstacle(path), transfer.surroundings(path[-1])
+        normals = transfer.stored_scene.face_normal
         return protocol.PathAnswer(
             id=message.id,
             length=None if obstacle is None else obstacle.length,
             material=None if obstacle is None else _material_name(transfer, obstacle.face),
+            normal=None if obstacle is None else _triple(normals[obstacle.face]),
             solid=_material_name(transfer, surroundings.face) if surroundings.is_solid else None,
         )
 
@@ -210,6 +213,11 @@ class MessageReceiver:
 
 def _material_name(transfer: FreeCameraTransfer, face: int) -> str:
     return transfer.material_names[int(transfer.stored_scene.face_material[face])]
+
+
+def _triple(vector: NDArray[np.float32]) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _permission_key(message: protocol.ClientMessage) -> str:
