@@ -641,10 +641,11 @@ export interface LookEntry {
   thumbnail: string | null;
 }
 
-/** Complete look and camera of each frame; cameras are null without a `path`. */
+/** Complete look and camera of each frame; cameras are null without a `path`. `crosses`: material of the first surface that the camera's path crosses, null if there is none. */
 export interface LooksBody {
   looks: Record<string, unknown>[];
   cameras: CameraFrame[] | null;
+  crosses: string | null;
 }
 
 /** A material in the plane of reflectance at normal incidence and roughness; `id` is that of its library entry. */
@@ -737,7 +738,7 @@ export interface PathAnswer {
   solid: string | null;
 }
 
-/** The first surface on a path: `length` of the path to it, meters, its material and unit normal; null if it is free. */
+/** The first surface on a path: path `length` to it, meters, its material and unit normal; null without one. */
 export interface PathBody {
   length: number | null;
   material: string | null;
