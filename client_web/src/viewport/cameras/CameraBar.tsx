@@ -18,7 +18,7 @@ import { navigation, toggleNavigation } from "./navigation";
 import { cameraKeyStep } from "./useCameraControl";
 
 const BROWSER_TITLE =
-  "This browser draws while the camera moves, without network traffic. The server draws sharp shadows of the sun and of small " +
+  "This browser draws while the camera moves and loads no pictures. The server draws sharp shadows of the sun and of small " +
   "lights, contact lines and one-pixel highlights too; scenes with glass or cutouts are always the server's.";
 const SERVER_TITLE = "The server draws while the camera moves and streams each picture.";
 const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This browser", server: "Server" };
