@@ -1,4 +1,4 @@
-/** Bar over a free-camera image: camera controls, renderer choice, and camera options. */
+/** Bar below a free-camera image: camera controls, renderer choice, and camera options. */
 import { computed } from "@preact/signals";
 import { useState } from "preact/hooks";
 import {

@@ -15,7 +15,6 @@ export interface Wall {
 
 const MAX_TURN = 0.05; // radians between points of a path
 const MAX_POINTS = 62; // per request
-const MAX_WAIT_MS = 1000; // a slow server does not hold the camera
 const MIN_COSINE = 0.1; // at more grazing angles, the camera comes nearer than the margin
 const MIN_SLIDE = 0.2; // fraction of a stopped movement; less is a stop
 
@@ -117,14 +116,13 @@ export class WallGuard {
     this.isBusy = false;
   }
 
-  /** The first surface within a margin of the way; null if nothing moves, or the server does not answer in time. */
+  /** The first surface within a margin of the way; null if nothing moves, or without an answer. */
   private async trace(way: readonly Waypoint[]): Promise<Obstacle | null> {
     const points = way.map(({ orbit }) => positionOf(orbit));
     if ((way.at(-1) as Waypoint).length < 1e-9) return null;
     const end = points.at(-1) as Triple;
-    const timeout = new Promise<null>((done) => setTimeout(() => done(null), MAX_WAIT_MS));
-    const answer = this.guarded.trace([...points, add(end, scale(lastDirection(points), this.margin))]);
-    return Promise.race([answer.catch(() => null), timeout]);
+    const extended = [...points, add(end, scale(lastDirection(points), this.margin))];
+    return this.guarded.trace(extended).catch(() => null); // without a server, nothing holds the camera
   }
 
   /** Stop a margin before a surface, and slide along it. */
