@@ -98,13 +98,16 @@ def _check(
     """Return the files to write, as JSON. Raises ParameterError if a look or the turntable is invalid."""
     from relume_cli.pictures.plans import complete_plan
     from relume_cli.pictures.write_images import check_turntable
+    from relume_server.batch.frame_sequence import crossed_material
 
     view = source.transfer.views[source.view]
     looks = [complete_plan(planned_file, source.transfer.default_look) for planned_file in planned_files]
     if any(look.environment.map is not None for look in looks):
         note("note: this environment was not baked, so shadows of small light sources are approximate")
     if turntable_plan is not None:
-        check_turntable(source, planned_files[0], turntable_plan)
+        animation, _ = check_turntable(source, planned_files[0], turntable_plan)
+        if (material := crossed_material(animation, source.view, source.transfer)) is not None:
+            note(f"note: the turntable passes through {material!r}; frames behind it show it from outside")
     common = {"scene": source.scene.id, "bake": source.bake.id, "view": source.view, "size": [view.width, view.height]}
     frames = 1 if turntable_plan is None else turntable_plan.frames
     return [

@@ -52,22 +52,25 @@ export interface BakeRequest {
 export interface CameraBody {
   to_world: number[];
   yfov: number;
+  near?: number;
   name: string;
 }
 
-/** Pose and field of view of a camera. `to_world`: camera to world, 16 numbers, row by row, looking along -Z; scale is removed. `yfov`: vertical, degrees. */
+/** Pose and field of view of a camera. `to_world`: camera to world, 16 numbers, row by row, looking along -Z; scale is removed. `yfov`: vertical, degrees. `near`: distance of the near clipping plane, meters; light and shadows are those of the whole scene. */
 export interface CameraFrame {
   to_world: number[];
   yfov: number;
+  near?: number;
 }
 
-/** client → server: move the "free" camera of a view, with this image size; the latest message counts, and frames repeat its `seq` as `camera_seq`. `to_world`, row by row, and `yfov` as in `CameraInfo`. `active_control`: as in an edit; nothing is prepared for it. `refine`: "exact": an exact image follows when the camera stops, and edits continue in it; "none": none follows. */
+/** client → server: move the "free" camera of a view, with this image size; the latest message counts, and frames repeat its `seq` as `camera_seq`. `to_world`, row by row, `yfov` and `near` as in `CameraInfo`. `active_control`: as in an edit; nothing is prepared for it. `refine`: "exact": an exact image follows when the camera stops, and edits continue in it; "none": none follows. */
 export interface CameraMessage {
   type: "camera";
   view: string;
   seq: number;
   to_world: number[];
   yfov: number;
+  near?: number;
   size: [number, number];
   active_control?: string | null;
   refine?: "exact" | "none";
@@ -173,6 +176,13 @@ export interface PatchOperation {
   op: "replace" | "add" | "remove" | "test";
   path: string;
   value?: unknown;
+}
+
+/** client → server: find the first surface on a path of a "free" camera; see `PathAnswer`. `id` is repeated. */
+export interface PathMessage {
+  type: "path";
+  id: number;
+  points: [number, number, number][];
 }
 
 /** client → server: keep-alive. Answered by a `PongMessage` at once, whatever is being computed. */
@@ -361,14 +371,16 @@ export interface BtfJobBody {
 export interface CameraEntry {
   to_world: number[];
   yfov: number;
+  near: number;
   name: string;
   is_placed: boolean;
 }
 
-/** A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians. */
+/** A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians. `near`: distance of the near clipping plane, meters. */
 export interface CameraInfo {
   to_world: number[];
   yfov: number;
+  near: number;
 }
 
 /** OpenColorIO config of the server; all fields are null or empty without one. `id` changes with the config; `default`: its default view; `working`: its name of linear Rec. 709; `spaces`: its linear color spaces, for EXR files. */
@@ -631,10 +643,11 @@ export interface LookEntry {
   thumbnail: string | null;
 }
 
-/** Complete look and camera of each frame; cameras are null without a `path`. */
+/** Complete look and camera of each frame; cameras are null without a `path`. `crosses`: material of the first surface that the camera's path crosses, null if there is none. */
 export interface LooksBody {
   looks: Record<string, unknown>[];
   cameras: CameraFrame[] | null;
+  crosses: string | null;
 }
 
 /** A material in the plane of reflectance at normal incidence and roughness; `id` is that of its library entry. */
@@ -715,6 +728,23 @@ export interface ParameterBody {
   help: string;
   step: number | null;
   requires_new_operator: boolean;
+}
+
+/** server → client: `length` of a path to its first surface, meters, with its material and unit normal; null if the path is free. `solid`: material of the closed surface that its last point is in, as inside a wall; null in rooms and in the open. */
+export interface PathAnswer {
+  type: "path";
+  id: number;
+  length: number | null;
+  material: string | null;
+  normal: [number, number, number] | null;
+  solid: string | null;
+}
+
+/** The first surface on a path: path `length` to it, meters, its material and unit normal; null without one. */
+export interface PathBody {
+  length: number | null;
+  material: string | null;
+  normal: [number, number, number] | null;
 }
 
 /** A participant. `id`: constant while in the room. `online`: false while the connection is lost. */
@@ -936,7 +966,7 @@ export interface ViewBody {
   view: string;
 }
 
-/** A view, its size in pixels and its camera; `camera_mode`: fixed at the baked camera, or free. For a free camera `bounds` are the minimum and maximum corner of the scene, meters. */
+/** A view, its size in pixels and its camera; `camera_mode`: fixed at the baked camera, or free. For a free camera `bounds` are the minimum and maximum corner of the scene, meters, and `interior_camera` is in its largest room. */
 export interface ViewInfo {
   name: string;
   width: number;
@@ -944,13 +974,16 @@ export interface ViewInfo {
   camera: CameraInfo;
   camera_mode: "fixed" | "free";
   bounds: [number[], number[]] | null;
+  interior_camera: CameraInfo | null;
 }
 
-/** Bounds of a scene, meters, and a camera that sees all of it. */
+/** Bounds of a scene, meters; a camera that sees all of it; one in its largest room, null if nothing is enclosed. `opens_inside`: the scene is a closed room that its first camera sees only from outside. */
 export interface ViewportBody {
   bounds_min: number[];
   bounds_max: number[];
   default_camera: CameraFrame;
+  interior_camera: CameraFrame | null;
+  opens_inside: boolean;
 }
 
 /** Factorization of a term for free cameras: `functions` basis functions of the incident light, with a `residual` (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than available; `is_mirror`: drawn as a blurred mirror instead. */
@@ -971,6 +1004,7 @@ export type ClientMessage =
   | AckMessage
   | EncodingMessage
   | InspectMessage
+  | PathMessage
   | HighlightMessage
   | PrepareMessage
   | CameraMessage
@@ -983,6 +1017,7 @@ export type ServerMessage =
   | StatusMessage
   | ProblemMessage
   | InspectAnswer
+  | PathAnswer
   | CurveMessage
   | BakeMessage
   | DrainMessage

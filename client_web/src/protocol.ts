@@ -36,6 +36,8 @@ export type {
   Person,
   PlanBody,
   InspectAnswer,
+  PathAnswer,
+  PathBody,
   Problem,
   ProblemMessage,
   RenderBody,

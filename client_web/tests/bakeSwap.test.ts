@@ -86,7 +86,7 @@ beforeEach(() => {
 });
 
 test("a new bake is shown from the placed camera", async () => {
-  const camera = { to_world: [1], yfov: 0.5 };
+  const camera = { to_world: [1], yfov: 0.5, near: 0 };
   storeCamera("front", { camera, size: [8, 6] });
   VIEWS[0] = { ...VIEWS[0], camera_mode: "free" } as never;
   const session = await newBake();

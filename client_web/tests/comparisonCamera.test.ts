@@ -46,7 +46,7 @@ test("a free-camera view is compared from its current camera, others as baked", 
 test("a comparison is outdated when the camera moves or the image size changes", () => {
   activeViewName.value = "front";
   const compared = comparedState();
-  freeCameraOf("front")?.change((orbit) => rotateOrbit(orbit, 0.3, 0));
+  freeCameraOf("front")?.jump((orbit) => rotateOrbit(orbit, 0.3, 0));
   const moved = comparedState();
   expect(moved).not.toBe(compared);
   freeCameraOf("front")?.resize([30, 30]);

@@ -1,19 +1,17 @@
 /** The status bar while a free camera stops: one text after the other, without flicker. */
 import { beforeEach, expect, test, vi } from "vitest";
 import { imageStatusText } from "../src/app/imageStatus";
+import { isCameraMoving } from "../src/state/cameras";
 import { connection, freezeStatus } from "../src/state/connection";
 import { isFrameExact } from "../src/state/fidelity";
 import { look } from "../src/state/look";
-import { shownViews, activeViewName, views } from "../src/state/views";
 
 const APPROXIMATE = "Approximate while the camera moves";
 const stage = (label: string) => ({ state: "shading" as const, view: "front", label, progress: 0.5 });
 
 beforeEach(() => {
   vi.useFakeTimers();
-  shownViews.value = ["front"];
-  views.value = [{ name: "front", camera_mode: "free" } as never];
-  activeViewName.value = "front";
+  isCameraMoving.value = true;
   look.value = { materials: {}, environment: { map: "" } } as never;
   connection.value = "open";
   freezeStatus.value = null;
@@ -25,7 +23,7 @@ test("between the stages of an exact image nothing else is said", () => {
   expect(imageStatusText.value).toBe(APPROXIMATE);
   const texts: string[] = [];
   const stop = imageStatusText.subscribe((text) => void texts.push(text));
-  freezeStatus.value = stage("exact samples of this camera");
+  freezeStatus.value = stage("exact direct light");
   freezeStatus.value = null;
   vi.advanceTimersByTime(100);
   freezeStatus.value = stage("the exact image of this camera");
@@ -35,7 +33,7 @@ test("between the stages of an exact image nothing else is said", () => {
   vi.advanceTimersByTime(1000);
   stop();
   expect(texts.slice(1, 3)).toEqual([
-    "Updating exact samples of this camera…",
+    "Updating exact direct light…",
     "Updating the exact image of this camera…",
   ]);
   expect(texts.slice(3)).toEqual([expect.stringMatching(/^Exact/)]);

@@ -25,7 +25,8 @@ const camera = projectionCameraOf({
   height: 100,
   camera_mode: "fixed",
   bounds: null,
-  camera: { to_world: [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], yfov: Math.PI / 2 },
+  interior_camera: null,
+  camera: { to_world: [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], yfov: Math.PI / 2, near: 0 },
 });
 const close = (a: readonly number[], b: readonly number[]) =>
   a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));

@@ -12,12 +12,15 @@ import {
   orbitOf,
   panOrbit,
   rotateOrbit,
+  turnHead,
+  walkOrbit,
   withFieldOfView,
+  withNearPlane,
   type Orbit,
 } from "../src/viewport/cameras/orbit";
 
 const bounds = { lowest: [-1, 0, -1] as const, highest: [1, 2, 1] as const } as never;
-const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, roll: 0, yfov: 40 };
+const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, roll: 0, yfov: 40, near: 0 };
 const positionOf = (orbit: Orbit) => [3, 7, 11].map((k) => poseOf(orbit).to_world[k] as number);
 const column = (orbit: Orbit, k: number) => [0, 4, 8].map((row) => poseOf(orbit).to_world[row + k] as number);
 const dot = (a: number[], b: number[]) => a.reduce((sum, value, k) => sum + value * (b[k] as number), 0);
@@ -95,7 +98,38 @@ describe("a camera that goes round a place", () => {
     expect(dollyOrbit(orbit, 0, bounds).distance).toBeGreaterThan(0);
     expect(dollyOrbit(orbit, 1e9, bounds).distance).toBeLessThan(1e4);
     expect(withFieldOfView(orbit, 0).yfov).toBe(1);
-    expect(withFieldOfView(orbit, 500).yfov).toBe(120);
+    expect(withFieldOfView(orbit, 500).yfov).toBe(170);
+  });
+
+  it("passes its target by bounded steps, and leaves the target before it", () => {
+    let now = orbit;
+    for (let k = 0; k < 80; k++) now = dollyOrbit(now, 0.86, bounds);
+    const [from, to] = [positionOf(orbit), positionOf(now)];
+    const forward = orbit.target.map((at, k) => (at - (from[k] as number)) / 4);
+    const traveled = dot(to.map((at, k) => at - (from[k] as number)), forward); // prettier-ignore
+    expect(traveled).toBeGreaterThan(4);
+    expect(now.distance).toBeGreaterThan(0);
+    const step = positionOf(dollyOrbit(now, 0, bounds)).map((at, k) => at - (to[k] as number));
+    expect(Math.hypot(...step)).toBeLessThan(0.3);
+  });
+
+  it("turns where it stands, walks on the level, and flies where it looks", () => {
+    const turned = turnHead(orbit, -0.3, 0.1);
+    positionOf(turned).forEach((value, k) => expect(value).toBeCloseTo(positionOf(orbit)[k] as number, 9));
+    expect(turned.azimuth).toBeCloseTo(orbit.azimuth - 0.3, 12);
+    const moved = (level: boolean) =>
+      positionOf(walkOrbit(orbit, [0, 0, 2], level)).map((value, k) => value - (positionOf(orbit)[k] as number));
+    expect(moved(true)[1]).toBeCloseTo(0, 12);
+    expect(Math.hypot(...moved(true))).toBeCloseTo(2, 12);
+    expect(moved(false)[1]).toBeCloseTo(-2 * Math.sin(0.3), 12);
+  });
+
+  it("keeps its near plane in its frame, and at no place behind it", () => {
+    const clipped = withNearPlane(orbit, 1.5);
+    expect(orbitOf(poseOf(clipped), bounds).near).toBe(1.5);
+    expect(withNearPlane(orbit, -1).near).toBe(0);
+    expect(isClose(orbit, clipped)).toBe(false);
+    expect(interpolateOrbits(orbit, clipped, 0.5).near).toBeCloseTo(0.75, 12);
   });
 
   it("comes to where it is sent, the short way round", () => {

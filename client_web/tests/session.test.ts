@@ -58,6 +58,7 @@ const handlers = {
   bake: vi.fn(),
   room: vi.fn(),
   comments: vi.fn(),
+  path: vi.fn(),
   roomUpdate: vi.fn(),
   onEditSent: vi.fn(),
   readOnly: vi.fn(),

@@ -25,7 +25,7 @@ from relume.camera.tiling import MAX_CONCURRENT_TILES, ImageTile, image_tiles
 from relume.camera.transparency_layers import TransparencyLayer, trace_layers
 from relume.core.thread_pools import map_ordered
 from relume.raytrace.alpha_filter import NUM_OFFSETS, STOP_AT_OPAQUE
-from relume.raytrace.camera_rays import camera_directions
+from relume.raytrace.camera_rays import camera_directions, near_distances
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera, Scene
 
@@ -96,7 +96,7 @@ class CameraSetup:
         self.check_canceled()
         return trace_layers(
             self.geometry, self.scene.materials, self._origin, directions, alpha_sample, self.pixel_angle,
-            traces_mirrors=self.traces_mirrors, facets=facets,
+            traces_mirrors=self.traces_mirrors, facets=facets, start=near_distances(self.camera, directions),
         )  # fmt: skip
 
     def find_edges(self, *, smooths: bool) -> EdgePixels:
@@ -139,7 +139,8 @@ class CameraSetup:
                 is_edge |= is_radiance_edge(layer, self.scene.environment.radiance, self._edge_threshold, size)
         alpha_test = self.geometry.embree.alpha_test
         if alpha_test is not None and alpha_test.blends:
-            is_edge |= is_partial_coverage(self.geometry, self._origin, directions)
+            start = near_distances(self.camera, directions)
+            is_edge |= is_partial_coverage(self.geometry, self._origin, directions, start)
         return is_edge, cosine
 
     def trace_tile(

@@ -141,11 +141,18 @@ def is_radiance_edge(
 
 
 def is_partial_coverage(
-    geometry: SceneBuffers, origin: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]
+    geometry: SceneBuffers,
+    origin: Shaped[F32, " 3"],
+    directions: Shaped[F32, "n 3"],
+    start: Shaped[F32, " n"] | None,
 ) -> Shaped[NDArray[np.bool_], " n"]:
-    """True for rays that meet a blended surface first. geometry: the triangles. origin, directions: unit"""
+    """True for rays that meet a blended surface first.
+
+    Args:
+        geometry: the triangles. origin, directions, start: of the rays, see `trace_rays`.
+    """
     any_hit, opaque_hit = (
-        trace_rays(geometry.embree, origin, directions, alpha_sample).face
+        trace_rays(geometry.embree, origin, directions, alpha_sample, start).face
         for alpha_sample in (STOP_AT_PARTIAL, STOP_AT_OPAQUE)
     )
     return np.asarray(any_hit != opaque_hit)

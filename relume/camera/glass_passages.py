@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relume.camera.refraction import MAX_GLASS_HITS
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
-from relume.raytrace.camera_rays import camera_directions, trace_rays
+from relume.raytrace.camera_rays import camera_directions, near_distances, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera
 
@@ -49,6 +49,8 @@ def trace_passages(geometry: SceneBuffers, camera: Camera, size: tuple[int, int]
     y, x = np.divmod(np.arange(num), size[0])
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     origins, ray = np.tile(camera.to_world[:3, 3].astype(np.float32), (num, 1)), np.arange(num)
+    if (start := near_distances(camera, directions)) is not None:
+        origins += start[:, None] * directions
     for _ in range(MAX_GLASS_HITS):
         hits = trace_rays(geometry.embree, origins, directions[ray], np.repeat(STOP_AT_OPAQUE, len(ray)))
         material = np.where(hits.face >= 0, geometry.face_material[np.maximum(hits.face, 0)], -1)

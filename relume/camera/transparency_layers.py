@@ -113,6 +113,7 @@ def trace_layers(
     *,
     traces_mirrors: bool = True,
     facets: Shaped[NDArray[np.float64], "n surfaces 2"] | None = None,
+    start: Shaped[F32, " n"] | None = None,
 ) -> list[TransparencyLayer]:
     """Trace camera rays through glass and off mirrors.
 
@@ -123,6 +124,7 @@ def trace_layers(
         traces_mirrors: add layers of reflections in mirrors.
         facets: two numbers in [0, 1) for each ray and successive glass surface, which choose the facets of frosted
             glass; None: glass is clear.
+        start: where the camera rays begin, see `trace_rays`.
     Returns:
         First a layer of all rays; then the layers of continued rays.
     """
@@ -137,7 +139,8 @@ def trace_layers(
 
     while queue:
         paths = queue.popleft()
-        hits = trace_rays(geometry.embree, paths.origins, paths.directions, alpha_samples[paths.ray])
+        hits = trace_rays(geometry.embree, paths.origins, paths.directions, alpha_samples[paths.ray], start)
+        start = None  # only camera rays begin at the near plane
         is_hit = hits.face >= 0
         face = np.maximum(hits.face, 0)
         material = geometry.face_material[face]

@@ -286,4 +286,5 @@ def read_targets(store: StoreReader) -> LightTargets:
 
 def _view_attributes(camera: Camera) -> dict[str, Any]:
     """Return a view's entry in a store's attributes."""
-    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
+    near = {"near": camera.near} if camera.near else {}
+    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov} | near

@@ -15,7 +15,8 @@ from relume.brdf.texture_slots import TEXTURES, user_images
 from relume.core.color import srgb_encode
 from relume.images.image_store import load_texture
 from relume.look import default_look
-from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
+from relume.raytrace.camera_rays import Hits, camera_directions, near_distances, trace_rays
+from relume.raytrace.interior import first_obstacle, interior_camera, sees_only_outside
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
 from relume.scene.model import Camera, Material, Scene, Texture
 from relume.scene.texture_encoding import mean_value
@@ -34,15 +35,20 @@ class Viewport:
     """A scene for camera placement.
 
     Attributes:
-        colors: colors of the materials, linear.
+        colors: colors of the materials, linear. material_names: of the scene.
         default_camera: a camera that frames the scene. bounds_min, bounds_max: corners of its bounds, meters.
+        interior_camera: a camera in its largest room; None if no place is enclosed.
+        opens_inside: True for a closed room whose first camera is outside.
     """
 
     geometry: SceneBuffers
     colors: Shaped[F32, "materials 3"]
+    material_names: Sequence[str]
     default_camera: Camera
     bounds_min: Shaped[F64, " 3"]
     bounds_max: Shaped[F64, " 3"]
+    interior_camera: Camera | None
+    opens_inside: bool
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Viewport:
@@ -51,12 +57,17 @@ class Viewport:
         terms = default_look(scene.materials, scene.lights)["materials"]
         colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
         corners = geometry.positions[geometry.faces.ravel()]
+        bounds = corners.min(axis=0).astype(np.float64), corners.max(axis=0).astype(np.float64)
+        rays = geometry.embree, geometry.face_normals
+        interior = interior_camera(*rays, bounds, "inside")
         return cls(
             geometry,
             np.array(colors, np.float32),
+            [material.name for material in scene.materials],
             framing_camera(scene.meshes, "framing"),
-            corners.min(axis=0).astype(np.float64),
-            corners.max(axis=0).astype(np.float64),
+            *bounds,
+            interior,
+            sees_only_outside(*rays, next(iter(scene.cameras), None), interior),
         )
 
     def image(self, camera: Camera, size: tuple[int, int]) -> Shaped[NDArray[np.uint8], "height width 3"]:
@@ -96,8 +107,23 @@ class Viewport:
             return None
         return np.asarray(camera.to_world[:3, 3] + float(hits.distance[0]) * directions[0].astype(np.float64))
 
+    def first_obstacle(
+        self, path: Sequence[Sequence[float]]
+    ) -> tuple[float | None, str | None, tuple[float, float, float] | None]:
+        """Return the length of a path to its first surface, meters, its material and unit normal; None if it is free.
+
+        Args:
+            path: corners of a polyline, meters.
+        """
+        obstacle = first_obstacle(self.geometry.embree, np.array(path, np.float64), self.geometry.epsilon)
+        if obstacle is None:
+            return None, None, None
+        x, y, z = self.geometry.face_normals[obstacle.face].tolist()
+        return obstacle.length, self.material_names[int(self.geometry.face_material[obstacle.face])], (x, y, z)
+
     def _trace(self, camera: Camera, directions: F32) -> Hits:
-        return trace_rays(self.geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+        position, start = camera.to_world[:3, 3].astype(np.float32), near_distances(camera, directions)
+        return trace_rays(self.geometry.embree, position, directions, start=start)
 
 
 def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:

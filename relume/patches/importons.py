@@ -20,7 +20,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import scatters_diffusely
-from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
+from relume.raytrace.camera_rays import Hits, camera_directions, near_distances, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_interaction import surface_at
 from relume.raytrace.surface_points import SurfacePoints
@@ -130,8 +130,9 @@ def _trace_paths(
     """Trace paths through random positions of an image; add their hits, at most `max_contact` of short paths."""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
+    directions = camera_directions(camera, size, x, y)
     hits, directions = _trace_hits(
-        geometry, camera.to_world[:3, 3].astype(np.float32), camera_directions(camera, size, x, y)
+        geometry, camera.to_world[:3, 3].astype(np.float32), directions, near_distances(camera, directions)
     )
     surface = surface_at(geometry, hits, directions)
     pixel_angle = np.float32(2 * math.tan(camera.yfov / 2) / height)
@@ -151,9 +152,9 @@ def _trace_paths(
         surface = surface_at(geometry, hits, directions)
 
 
-def _trace_hits(geometry: SceneBuffers, origin: F32, directions: F32) -> tuple[Hits, F32]:
+def _trace_hits(geometry: SceneBuffers, origin: F32, directions: F32, start: F32 | None = None) -> tuple[Hits, F32]:
     """Return the hits of rays that hit anything, and their directions."""
-    hits = trace_rays(geometry.embree, origin, directions)
+    hits = trace_rays(geometry.embree, origin, directions, start=start)
     is_hit = hits.face >= 0
     return hits.rows(is_hit), directions[is_hit]
 

@@ -81,7 +81,11 @@ def _trace(tracer, origins, directions, alpha_sample, start, stop, hits):  # typ
 
 
 def trace_rays(
-    scene: EmbreeScene, origin: F32, directions: Shaped[F32, "n 3"], alpha_sample: F32 | np.float32 = _BY_DIRECTION
+    scene: EmbreeScene,
+    origin: F32,
+    directions: Shaped[F32, "n 3"],
+    alpha_sample: F32 | np.float32 = _BY_DIRECTION,
+    start: Shaped[F32, " n"] | None = None,
 ) -> Hits:
     """Find the first hits of rays from one origin, or from one origin each.
 
@@ -89,7 +93,13 @@ def trace_rays(
         scene: the triangles. origin: (3,) or (n, 3). directions: unit.
         alpha_sample: alpha sample of each ray (n,), or one for all, in (0, 1] for blended surfaces or a constant of
             `alpha_filter`.
+        start: distances from the origin at which the rays begin, as from `near_distances`; None: zero.
+    Returns:
+        Hits with distances from `origin`.
     """
+    if start is not None:
+        hits = trace_rays(scene, origin + start[:, None] * directions, directions, alpha_sample)
+        return hits._replace(distance=hits.distance + start)
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
     is_coherent, alpha_samples = len(origins) == 1, np.atleast_1d(alpha_sample)
@@ -98,6 +108,18 @@ def trace_rays(
     rays_per_range = max(_RAYS_PER_RANGE, n // (_RANGES_PER_THREAD * num_threads()))
     for_ranges(lambda start, stop: _trace(*args, start, stop, hits), n, rays_per_range)
     return hits
+
+
+def near_distances(camera: Camera, directions: Shaped[F32, "n 3"]) -> Shaped[F32, " n"] | None:
+    """Return the distances from a camera to its near plane along rays; None if nothing is clipped.
+
+    Args:
+        camera: the camera. directions: of rays through its image, unit.
+    """
+    if camera.near == 0:
+        return None
+    cosine = directions @ -camera.to_world[:3, 2].astype(np.float32)
+    return np.asarray(np.float32(camera.near) / np.maximum(cosine, np.float32(1e-6)), np.float32)
 
 
 def camera_directions(

@@ -15,7 +15,7 @@ from relume.scene.model import Camera, Scene
 MAX_NAME = 80
 MIN_YFOV, MAX_YFOV = 1.0, 170.0  # degrees
 MAX_DISTANCE_M = 1e6  # meters from the origin; beyond, float32 rays of neighboring pixels are equal
-_FIELDS = ("name", "to_world", "yfov")
+_FIELDS, _OPTIONAL_FIELD = ("name", "to_world", "yfov"), "near"
 # largest allowed deviation from right angles; deviation below which axes are kept as they are
 _ANGLE_TOLERANCE, _RIGID_TOLERANCE = 1e-3, 1e-8
 
@@ -27,50 +27,59 @@ class CustomCamera:
     Attributes:
         to_world: camera to world, 16 numbers by row; rigid.
         yfov: vertical field of view, degrees.
+        near: distance of the near clipping plane, meters.
     """
 
     name: str
     to_world: tuple[float, ...]
     yfov: float
+    near: float = 0.0
 
     @property
     def camera(self) -> Camera:
         """Convert to a camera of a scene."""
-        return Camera(self.name, np.array(self.to_world).reshape(4, 4), math.radians(self.yfov))
+        return Camera(self.name, np.array(self.to_world).reshape(4, 4), math.radians(self.yfov), near=self.near)
 
     def document(self) -> dict[str, Any]:
         """Convert to JSON; the inverse of `read_custom_camera`."""
-        return {"name": self.name, "to_world": list(self.to_world), "yfov": self.yfov}
+        near = {"near": self.near} if self.near else {}  # recipes without one keep their identity
+        return {"name": self.name, "to_world": list(self.to_world), "yfov": self.yfov} | near
 
 
-def make_custom_camera(name: str, to_world: Sequence[float], yfov: float) -> CustomCamera:
+def make_custom_camera(name: str, to_world: Sequence[float], yfov: float, near: float = 0.0) -> CustomCamera:
     """Validate a camera that a user placed.
 
     Args:
         name: name of its views.
         to_world: camera to world, 16 numbers by row; the camera looks along its -Z. Scale is removed.
         yfov: vertical field of view, degrees.
+        near: distance of the near clipping plane, meters; 0: nothing is clipped.
     Raises:
         ParameterError: a value is invalid.
     """
     _check_name(name)
     if not (math.isfinite(yfov) and MIN_YFOV <= yfov <= MAX_YFOV):
         raise ParameterError("yfov", yfov, f"a vertical field of view of {MIN_YFOV:g} to {MAX_YFOV:g} degrees")
-    return CustomCamera(name, _rigid(to_world), float(yfov))
+    if not (math.isfinite(near) and 0 <= near <= MAX_DISTANCE_M):
+        raise ParameterError("near", near, f"0 to {MAX_DISTANCE_M:,.0f} m")
+    return CustomCamera(name, _rigid(to_world), float(yfov), float(near))
 
 
 def read_custom_camera(document: object) -> CustomCamera:
     """Read the camera of a JSON document. Raises ParameterError."""
-    if not isinstance(document, Mapping) or set(document) != set(_FIELDS):
-        raise ParameterError("camera", document, "an object with " + ", ".join(_FIELDS))
+    if not isinstance(document, Mapping) or set(document) - {_OPTIONAL_FIELD} != set(_FIELDS):
+        raise ParameterError("camera", document, "an object with " + ", ".join(_FIELDS) + ", and perhaps near")
     name, to_world, yfov = (document[field] for field in _FIELDS)
+    near = document.get(_OPTIONAL_FIELD, 0.0)
     if not isinstance(name, str):
         raise ParameterError("name", name, "text")
     if not isinstance(to_world, list) or not all(map(_is_number, to_world)):
         raise ParameterError("to_world", to_world, "16 numbers by row")
     if not _is_number(yfov):
         raise ParameterError("yfov", yfov, "a number of degrees")
-    return make_custom_camera(name, to_world, yfov)
+    if not _is_number(near):
+        raise ParameterError("near", near, "a number of meters")
+    return make_custom_camera(name, to_world, yfov, near)
 
 
 def with_cameras(scene: Scene, cameras: Iterable[Camera]) -> Scene:

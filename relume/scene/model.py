@@ -147,12 +147,14 @@ class Camera:
     Attributes:
         to_world: camera to world, rigid.
         aspect: width ÷ height from the file, or None. Images may have any other.
+        near: distance of the near clipping plane, meters; camera rays begin there, light and shadows do not change.
     """
 
     name: str
     to_world: Shaped[NDArray[np.float64], "4 4"]
     yfov: float
     aspect: float | None = None
+    near: float = 0.0
 
 
 @dataclass(frozen=True)

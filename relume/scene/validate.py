@@ -73,10 +73,12 @@ def check_maps(material: Material) -> None:
 
 
 def check_camera(camera: Camera) -> None:
-    """Raise SceneError unless the frame is rigid and finite and the field of view is between 0 and 180°."""
+    """Raise SceneError unless the frame is rigid and finite, and field of view and near plane are possible."""
     to_world = camera.to_world
     if to_world.shape != (4, 4) or not np.isfinite(to_world).all() or not 0 < camera.yfov < np.pi:
         raise SceneError(f"camera {camera.name!r} has an invalid position or field of view; set them")
+    if not 0 <= camera.near < np.inf:
+        raise SceneError(f"camera {camera.name!r} has an invalid near plane; set it to 0 or more meters")
     if not np.allclose(to_world[:3, :3] @ to_world[:3, :3].T, np.eye(3), atol=1e-4):
         raise SceneError(f"camera {camera.name!r} has scale or shear in its transform; remove them")
 

@@ -19,7 +19,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.raytrace.barycentric import FacePoints
-from relume.raytrace.camera_rays import camera_directions, trace_rays
+from relume.raytrace.camera_rays import camera_directions, near_distances, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.shading_normals import flip_to_viewer
 from relume.raytrace.surface_points import SurfacePoints
@@ -133,7 +133,8 @@ def points_in_pixels(
     (y, x), (row, column), step = np.divmod(pixel, size[0]), np.divmod(number, side[sample]), 1 / side[sample]
     at_x, at_y = ((a[sample] + (b + 0.5) * step).astype(np.float32) for a, b in ((x, column), (y, row)))
     directions = camera_directions(camera, size, at_x, at_y)
-    hits = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    position, start = camera.to_world[:3, 3].astype(np.float32), near_distances(camera, directions)
+    hits = trace_rays(geometry.embree, position, directions, start=start)
     found = np.flatnonzero((hits.face >= 0) & (geometry.face_material[np.maximum(hits.face, 0)] == material))
     directions = directions[found]
     face_points = FacePoints.from_hits(geometry, hits.rows(found), directions)

@@ -42,7 +42,8 @@ def read_camera(store: StoreReader, k: int) -> Camera:
     try:
         attributes = store.attributes["views"][k]
         to_world = np.array(attributes["to_world"], np.float64).reshape(4, 4)
-        camera = Camera(str(attributes["name"]), to_world, float(attributes["yfov"]))
+        near = float(attributes.get("near", 0.0))
+        camera = Camera(str(attributes["name"]), to_world, float(attributes["yfov"]), near=near)
         check_camera(camera)
     except (KeyError, TypeError, ValueError, SceneError) as error:
         raise StoreError(f"view {k} of the store has no camera ({error}); delete the bake, bake again") from error

@@ -55,6 +55,7 @@ CLIENT_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.AckMessage,
     protocol.EncodingMessage,
     protocol.InspectMessage,
+    protocol.PathMessage,
     protocol.HighlightMessage,
     protocol.PrepareMessage,
     protocol.CameraMessage,
@@ -67,6 +68,7 @@ SERVER_MESSAGES: tuple[type[BaseModel], ...] = (
     protocol.StatusMessage,
     protocol.ProblemMessage,
     protocol.InspectAnswer,
+    protocol.PathAnswer,
     protocol.CurveMessage,
     protocol.BakeMessage,
     connection.DrainMessage,
@@ -97,6 +99,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     cameras.CameraEntry,
     cameras.ViewportBody,
     cameras.PickBody,
+    cameras.PathBody,
     bodies.ExampleSceneBody,
     color.ColorBody,
     models.ModelBody,
@@ -138,10 +141,13 @@ def generate_protocol() -> str:
     blocks.append(f"export const LUT_SIZE = {literal(SIZE)};")
     blocks.append(f"export const LUT_GAIN = {literal(GAIN)};")
     blocks.append(f"/** Worst first. */\nexport const FIDELITIES: Fidelity[] = {literal(list(Fidelity))};")
+    definitions = dict[str, str]()
     for mode, mode_models in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in mode_models], by_alias=True)  # type: ignore[misc]
-        blocks.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
-    blocks = list(dict.fromkeys(blocks))  # a definition that inputs and outputs share is written once
+        for name, body in sorted(schema["$defs"].items()):
+            # a definition that inputs and outputs share is written once, with the optional fields of inputs
+            definitions.setdefault(name, interface(name, body, mode))
+    blocks.extend(definitions.values())
     blocks.append(union("ClientMessage", CLIENT_MESSAGES))
     blocks.append(union("ServerMessage", SERVER_MESSAGES))
     return "\n\n".join(blocks) + "\n"

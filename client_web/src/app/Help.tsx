@@ -6,7 +6,7 @@ import { keyName } from "../ui/chord";
 import { useReturnFocus } from "../ui/restoreFocus";
 import { SHORTCUTS, FOCUS_KEYS } from "./shortcuts";
 
-const GROUPS = ["Picture", "Look", "Compare", "Curve", "Panels"] as const;
+const GROUPS = ["Picture", "Camera", "Look", "Compare", "Curve", "Panels"] as const;
 
 export function Help() {
   const panel = useRef<HTMLDivElement>(null);

@@ -2,10 +2,10 @@
 import { computed, effect, signal } from "@preact/signals";
 import { isPlaying } from "../panels/timeline/playback";
 import { method } from "../state/bakes";
+import { isCameraMoving } from "../state/cameras";
 import { connection, freezeStatus } from "../state/connection";
 import { isConverged } from "../state/fidelity";
 import { look, usesBakedEnvironment } from "../state/look";
-import { hasFreeCamera } from "../state/views";
 
 type Kind = "none" | "stage" | "approximate" | "exact";
 
@@ -25,7 +25,7 @@ function currentStatus(): ImageStatus {
       kind: "exact",
     };
   if (isPlaying.value) return { text: "Playing", kind: "approximate" };
-  return { text: hasFreeCamera.value ? "Approximate while the camera moves" : "Refining…", kind: "approximate" };
+  return { text: isCameraMoving.value ? "Approximate while the camera moves" : "Refining…", kind: "approximate" };
 }
 
 /** Longest time between two stages, or from the last one to the exact image. */

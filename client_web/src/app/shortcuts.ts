@@ -11,10 +11,13 @@ import { falseColor, handlesOpen, isReferenceShown, wipe } from "../state/displa
 import { look } from "../state/look";
 import { filmstripOpen, helpOpen, histogramOpen, inspectorOpen, scenePanelOpen, timelineOpen } from "../state/panels";
 import { togglePlay } from "../panels/timeline/playback";
-import { toggleSideBySide } from "../state/views";
+import { activeViewName, toggleSideBySide } from "../state/views";
+import { freeCameraOf, type FreeCamera } from "../viewport/cameras/freeCamera";
+import { toggleNavigation } from "../viewport/cameras/navigation";
+import { showNote, reportErrors } from "../ui/toasts";
 
 export interface Shortcut {
-  group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";
+  group: "Picture" | "Camera" | "Look" | "Compare" | "Curve" | "Panels";
   label: string;
   /** `KeyboardEvent.key`, prefixed with "Ctrl+" and "Shift+" if they matter. */
   keys: string[];
@@ -39,6 +42,12 @@ function toggleAllPanels(): void {
   scenePanelOpen.value = inspectorOpen.value = filmstripOpen.value = open;
 }
 
+function withFreeCamera(run: (camera: FreeCamera) => void): void {
+  const freeCamera = freeCameraOf(activeViewName.peek());
+  if (freeCamera === null) showNote("This view has a fixed camera. Bake with a free camera to move it.");
+  else run(freeCamera);
+}
+
 export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Zoom in", keys: ["+", "="], run: () => zoomBy(1.25) },
   { group: "Picture", label: "Zoom out", keys: ["-"], run: () => zoomBy(1 / 1.25) },
@@ -51,6 +60,15 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Light handles", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
   { group: "Picture", label: "Exposure −⅓ stop", keys: [","], run: () => changeExposure(-THIRD_STOP) },
   { group: "Picture", label: "Exposure +⅓ stop", keys: ["."], run: () => changeExposure(THIRD_STOP) },
+  { group: "Camera", label: "Walk or orbit", keys: ["o"], run: () => withFreeCamera(toggleNavigation) },
+  { group: "Camera", label: "Go inside a room", keys: ["i"], run: () => withFreeCamera((camera) => camera.goInside()) },
+  {
+    group: "Camera",
+    label: "Step through the wall ahead",
+    keys: ["j"],
+    run: () => withFreeCamera((camera) => void reportErrors(() => camera.stepThrough())),
+  },
+  { group: "Camera", label: "Previous camera", keys: ["b"], run: () => withFreeCamera((camera) => camera.goBack()) },
   { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: () => void undo() },
   { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: () => void redo() },
   { group: "Look", label: "Save look", keys: ["Ctrl+s"], run: () => void saveLook() },
@@ -101,6 +119,11 @@ export const FOCUS_KEYS: readonly (readonly [label: string, keys: readonly strin
   ["Comment pin: move by 10 px", ["Shift+arrow"]],
   ["Picture: pan, or orbit camera", ["←", "→", "↑", "↓"]],
   ["Camera: pan", ["Shift+arrow"]],
+  ["Camera: fly while the right button is held", ["W", "A", "S", "D", "Q", "E"]],
+  ["Walking: walk, down, up", ["W", "A", "S", "D", "Q", "E"]],
+  ["Walking: turn, step", ["←", "→", "↑", "↓"]],
+  ["Walking: look up, down", ["Shift+↑", "Shift+↓"]],
+  ["Walking: four times as fast", ["Shift"]],
   ["Camera: dolly in, out", ["+", "−"]],
   ["Camera: reset view", ["Home"]],
   ["Side-by-side view: show alone", ["Enter"]],

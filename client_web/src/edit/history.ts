@@ -19,7 +19,7 @@ export interface NamedLook {
 
 /** A keyframe of the timeline; `camera`: its pose on a camera path through the keyframes. Angles in degrees. */
 export interface Keyframe extends NamedLook {
-  camera?: { to_world: number[]; yfov: number } | null;
+  camera?: { to_world: number[]; yfov: number; near?: number } | null;
 }
 
 /** Change of a saved look; null: none before or after. */

@@ -1,4 +1,4 @@
-/** Free-camera views drawn by this browser: camera motion needs no network. The server sends the look's tables (frames of
+/** Free-camera views drawn by this browser: camera motion loads no pictures. The server sends the look's tables (frames of
  * kind "scene_update") and exact images; while its tables are outdated, or if the browser cannot draw, it sends all images. */
 import { computed, effect, signal } from "@preact/signals";
 import { FreeCameraRenderer } from "../render/freeCamera/freeCameraRenderer";

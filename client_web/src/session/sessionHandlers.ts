@@ -20,6 +20,7 @@ import { focusedView } from "../state/views";
 import { clearErrors, showError } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
 import { onFrame } from "./clientRendering";
+import { deliverPath } from "./pathTracing";
 import { deliverProbe } from "./pixelProbe";
 import { applyBake } from "./bakeSwap";
 import { sendRegions } from "./sendRegions";
@@ -105,6 +106,7 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
       const pixel = pixelProbe.peek();
       if (isShown() && pixel?.view === message.view) pixelProbe.value = { ...pixel, answer: message };
     },
+    path: (message) => deliverPath(message),
     curve(message) {
       if (isShown() && message.curve === curvePath.peek()) showCurvePreview(message);
     },

@@ -1,6 +1,10 @@
 /** Placed cameras of the open scene's views, used for all its bakes, including a pending one. */
+import { signal } from "@preact/signals";
 import type { HelloMessage } from "../protocol";
 import { scene } from "./scene";
+
+/** True while a free camera moves. */
+export const isCameraMoving = signal(false);
 
 export interface PlacedCamera {
   camera: HelloMessage["views"][number]["camera"];

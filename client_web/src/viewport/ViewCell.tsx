@@ -1,8 +1,10 @@
 /** One view: its canvas, overlays, and pointer and keyboard navigation. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { freeCameraOf } from "./cameras/freeCamera";
+import { navigation } from "./cameras/navigation";
 import { dollyOrbit } from "./cameras/orbit";
-import { zoomIn, orbitKeyStep } from "./cameras/useCameraControl";
+import { cameraKeyStep, zoomIn } from "./cameras/useCameraControl";
+import { Walker } from "./cameras/walker";
 import { CommentPins } from "../panels/collaboration/CommentPins";
 import { acceptImageDrops } from "../panels/inspector/images/dropImages";
 import { acceptMaterialDrops } from "../panels/library/dropMaterial";
@@ -16,19 +18,32 @@ import { setTransform, transformOf } from "../render/viewTransforms";
 import { wipe } from "../state/display";
 import { scene } from "../state/scene";
 import { showSingleView, sideBySide, activeViewName, views, setFocus } from "../state/views";
-import { reportErrors, showError } from "../ui/toasts";
+import { reportErrors, showError, showNote } from "../ui/toasts";
 import { BusyOverlay } from "./BusyOverlay";
 import { WipeHandle } from "./WipeHandle";
 import { panView, useViewPointer } from "./usePointer";
 
 const PAN_PX = 48;
+const KEYS = {
+  orbit: "Arrow keys: orbit. Shift+arrows: pan. Plus and minus: dolly. Home: reset view. O: walk.",
+  walk: "W A S D: walk. Q and E: down and up. Arrow keys: turn and step. Plus and minus: dolly. Home: reset view. O: orbit.",
+};
+
+/** Keys of the camera, such as Home, follow a turn of the wheel. */
+function focusUnlessTyping(canvas: HTMLCanvasElement): void {
+  if (document.activeElement?.matches("input, textarea, select, [contenteditable]") !== true)
+    canvas.focus({ preventScroll: true });
+}
 
 function onWheel(screen: ImageCanvas, event: WheelEvent): void {
   event.preventDefault();
   const { view } = screen.image;
   const freeCamera = freeCameraOf(view);
-  if (freeCamera !== null && !event.ctrlKey)
+  if (freeCamera !== null && !event.ctrlKey) {
+    focusUnlessTyping(screen.canvas);
+    freeCamera.beginDolly();
     return freeCamera.change((orbit) => dollyOrbit(orbit, zoomIn(event), freeCamera.bounds));
+  }
   const { x, y } = pickMaterial(screen, event);
   const lines = event.deltaMode === 1 ? 30 : 1;
   const factor = Math.exp((-event.deltaY * lines * (event.ctrlKey ? 4 : 1)) / 500);
@@ -87,17 +102,35 @@ function useScreen(view: string) {
 async function onDoubleClick(screen: ImageCanvas, view: string, event: MouseEvent): Promise<void> {
   const freeCamera = freeCameraOf(view);
   if (sideBySide.peek() || freeCamera === null) return sideBySide.peek() ? showSingleView(view) : undefined;
+  screen.canvas.focus({ preventScroll: true });
   const { px, py } = pickMaterial(screen, event);
   const { position } = await requestPixelProbe(view, px, py);
   if (position !== null) freeCamera.lookAt(position);
+  else showNote("There is only background here. Double-click a surface to focus on it.");
+  return undefined;
 }
 
-function onViewKey(screen: ImageCanvas, event: KeyboardEvent): void {
+/** Walking keys act while the camera walks, or while the right button is held. */
+function useWalker(view: string, isRightHeld: { current: boolean }): Walker {
+  const shown = useRef(view);
+  shown.current = view;
+  const walker = useRef<Walker | null>(null);
+  const isWalking = () => navigation.peek() === "walk";
+  walker.current ??= new Walker(
+    () => (isWalking() || isRightHeld.current ? freeCameraOf(shown.current) : null),
+    isWalking,
+  );
+  useEffect(() => () => walker.current?.stop(), []);
+  return walker.current;
+}
+
+function onViewKey(screen: ImageCanvas, walker: Walker, isRightHeld: boolean, event: KeyboardEvent): void {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const freeCamera = freeCameraOf(screen.image.view);
   if (freeCamera !== null && event.key === "Home") return (freeCamera.restart(), event.preventDefault());
   if (freeCamera !== null && event.key !== "Enter") {
-    if (orbitKeyStep(freeCamera.change, freeCamera.bounds, event.key, event.shiftKey)) {
+    const walks = (navigation.peek() === "walk" || isRightHeld) && walker.press(event);
+    if (walks || cameraKeyStep(freeCamera, event.key, event.shiftKey)) {
       event.preventDefault();
       event.stopPropagation();
     }
@@ -126,7 +159,9 @@ function ViewName({ view }: { view: string }) {
 export function ViewCell({ view }: { view: string }) {
   void scene.value; // another scene may have a view of the same name
   const { canvas, screen, failure } = useScreen(view);
-  const pointer = useViewPointer(screen, view);
+  const isRightHeld = useRef(false);
+  const pointer = useViewPointer(screen, view, isRightHeld);
+  const walker = useWalker(view, isRightHeld);
   const isGrid = sideBySide.value;
   const moves = views.value.find(({ name }) => name === view)?.camera_mode === "free";
   const label = isGrid ? `View ${view}. Enter: show alone.` : "Picture.";
@@ -136,8 +171,10 @@ export function ViewCell({ view }: { view: string }) {
         ref={canvas}
         tabIndex={0}
         role="img"
-        aria-label={`${label} ${moves ? "Arrow keys: orbit. Shift+arrows: pan. Plus and minus: dolly. Home: reset view." : "Arrow keys: pan. Plus and minus: zoom."} Select materials in the list.`}
-        onKeyDown={(event) => screen !== null && onViewKey(screen, event)}
+        aria-label={`${label} ${moves ? KEYS[navigation.value] : "Arrow keys: pan. Plus and minus: zoom."} Select materials in the list.`}
+        onKeyDown={(event) => screen !== null && onViewKey(screen, walker, isRightHeld.current, event)}
+        onKeyUp={(event) => walker.release(event)}
+        onBlur={() => walker.stop()}
         onFocus={() => setFocus(view)}
         onDblClick={(event) => screen !== null && void reportErrors(() => onDoubleClick(screen, view, event))}
         onContextMenu={(event) => freeCameraOf(view) !== null && event.preventDefault()}

@@ -43,12 +43,12 @@ export function Viewport() {
             <ViewCell key={index} view={name} />
           ))}
         </div>
-        <CameraBar />
         <PlacementBar />
         <FilterBadge />
         <HistogramView />
         <Toasts />
       </div>
+      <CameraBar />
       <FalseColorLegend />
       <ViewportBar />
     </main>

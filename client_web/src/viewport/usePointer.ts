@@ -2,8 +2,8 @@
 import { useRef } from "preact/hooks";
 import { freeCameraOf } from "./cameras/freeCamera";
 import { TouchGestures, type PinchMove } from "./cameras/touchGestures";
-import { dollyOrbit, panOrbit, rotateOrbit } from "./cameras/orbit";
-import { RADIANS_PER_PIXEL } from "./cameras/useCameraControl";
+import { dollyOrbit, panOrbit } from "./cameras/orbit";
+import { dragCamera } from "./cameras/useCameraControl";
 import { placePin } from "../panels/collaboration/commentActions";
 import { placeLightAt, placingKind } from "../panels/lights/placement";
 import { requestPixelProbe } from "../session/pixelProbe";
@@ -20,6 +20,7 @@ import { clearProbe, probeAt } from "./pixelReadout";
 type ViewPointerTarget = PointerEvent & { readonly currentTarget: Element };
 
 const CLICK_PX = 4;
+const RIGHT_BUTTON = 2;
 
 export function panView(screen: ImageCanvas, dx: number, dy: number): void {
   const { view } = screen.image;
@@ -50,12 +51,14 @@ function pinchCamera(screen: ImageCanvas, view: string, { across, down, center, 
   );
 }
 
-export function useViewPointer(screen: ImageCanvas | null, view: string) {
+/** `isRightHeld`: set while the right button is held. */
+export function useViewPointer(screen: ImageCanvas | null, view: string, isRightHeld: { current: boolean }) {
   const drag = useRef({ x: 0, y: 0, moved: false });
   const begin = (event: PointerEvent) => {
     drag.current = { x: event.clientX, y: event.clientY, moved: false };
     const freeCamera = freeCameraOf(view);
     void freeCamera?.grab();
+    isRightHeld.current = event.button === RIGHT_BUTTON;
     return event.button <= (freeCamera === null ? 1 : 2);
   };
   const move = (event: PointerEvent) => {
@@ -69,12 +72,7 @@ export function useViewPointer(screen: ImageCanvas | null, view: string) {
     if (freeCamera === null) return panView(screen, dx, dy);
     clearProbe(); // the probed point has moved away from the pointer
     const { height } = screen.size();
-    if (event.shiftKey || (event.buttons & 6) !== 0)
-      freeCamera.change((orbit) => panOrbit(orbit, dx / height, dy / height));
-    else
-      freeCamera.change((orbit) =>
-        rotateOrbit(orbit, (-RADIANS_PER_PIXEL * dx) / height, (RADIANS_PER_PIXEL * dy) / height),
-      );
+    dragCamera(freeCamera, event, dx / height, dy / height);
   };
   const hover = (event: PointerEvent) => {
     if (screen === null) return;
@@ -84,6 +82,7 @@ export function useViewPointer(screen: ImageCanvas | null, view: string) {
     hoveredMaterial.value = material;
   };
   const end = (event: PointerEvent, released: boolean) => {
+    isRightHeld.current = false;
     if (screen === null || !released || drag.current.moved || event.button !== 0) return;
     const { px, py, material } = pickMaterial(screen, event);
     if (placingKind.peek() !== null) void placeLightAt(view, px, py);

@@ -64,7 +64,7 @@ def interpolate_cameras(cameras: Sequence[Camera], num_cameras: int) -> list[Cam
     """Interpolate from the first camera to the last through all others, at equal time steps.
 
     Positions follow monotone cubics (PCHIP), orientations a rotation spline, and fields of view cubics of their
-    logarithm.
+    logarithm; near planes follow cubics.
 
     Args:
         cameras: at least one. num_cameras: number of cameras of cameras on the path, ends included.
@@ -76,9 +76,10 @@ def interpolate_cameras(cameras: Sequence[Camera], num_cameras: int) -> list[Cam
     positions = PchipInterpolator(keys, frames[:, :3, 3])(times)
     rotations = RotationSpline(keys, Rotation.from_matrix(frames[:, :3, :3]))(times).as_matrix()
     angles = np.exp(PchipInterpolator(keys, np.log([camera.yfov for camera in cameras]))(times))
+    nears = PchipInterpolator(keys, [camera.near for camera in cameras])(times)
     path = []
-    for position, rotation, yfov in zip(positions, rotations, angles, strict=True):
+    for position, rotation, yfov, near in zip(positions, rotations, angles, nears, strict=True):
         to_world = np.eye(4)
         to_world[:3, :3], to_world[:3, 3] = rotation, position
-        path.append(replace(cameras[0], to_world=to_world, yfov=float(yfov)))
+        path.append(replace(cameras[0], to_world=to_world, yfov=float(yfov), near=float(near)))
     return path

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from relume.brdf.fresnel import schlick
 from relume.look.glass import GlassOfLook
 from relume.probes.stored_scene import StoredScene
-from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
 from relume.raytrace.alpha_test import GLASS_RULE, AlphaMasks
-from relume.raytrace.camera_rays import Hits, trace_rays
+from relume.raytrace.camera_rays import Hits
 from relume.raytrace.embree import EmbreeScene
 
 F32 = NDArray[np.float32]
@@ -37,16 +36,10 @@ class GlassLayers(NamedTuple):
 NO_GLASS = GlassLayers(np.empty(0, np.int64), np.empty((0, 3), np.float32), np.empty((0, 6), np.float32))
 
 
-def trace_glass(embree: EmbreeScene, camera_position: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]) -> Hits | None:
-    """Return the first hits of camera rays including glass; None if the scene has no glass.
-
-    Args:
-        embree: the triangles. camera_position: origin of the rays. directions: directions of the rays, unit.
-    """
+def has_glass(embree: EmbreeScene) -> bool:
+    """Return whether a scene has glass. embree: its triangles"""
     alpha_test = embree.alpha_test
-    if alpha_test is None or not (alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE).any():
-        return None
-    return trace_rays(embree, camera_position, directions, STOP_AT_OPAQUE)
+    return alpha_test is not None and bool((alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE).any())
 
 
 def find_glass_layers(
@@ -59,7 +52,7 @@ def find_glass_layers(
     """Return the glass in front of rays.
 
     Args:
-        embree: the triangles. stored_scene: the scene. glass_hits: from `trace_glass`.
+        embree: the triangles. stored_scene: the scene. glass_hits: first hits including glass.
         directions: directions of the rays. rules: of the glass; None: as in the scene.
     """
     masks = _alpha_masks(embree)

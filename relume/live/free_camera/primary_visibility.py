@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, find_edges, samples_per_edge
-from relume.live.free_camera.glass import NO_GLASS, GlassLayers, find_glass_layers, trace_glass
+from relume.live.free_camera.glass import NO_GLASS, GlassLayers, find_glass_layers, has_glass
 from relume.probes.stored_scene import StoredScene
 from relume.probes.triangle_grids import surrounding_nodes
 from relume.raytrace.alpha_filter import IGNORE_GLASS, STOP_AT_OPAQUE
-from relume.raytrace.camera_rays import Hits, trace_rays
+from relume.raytrace.camera_rays import Hits, near_distances, trace_rays
 from relume.raytrace.embree import EmbreeScene
 from relume.scene.model import Camera
 
@@ -142,12 +142,9 @@ def trace_primary(
         stored_scene: the scene. embree: its triangles. camera: camera of the image. size: width and height in pixels.
         glass_rules: see `GlassLayers`; None: as in the scene.
     """
-    num_pixels, camera_position = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
+    num_pixels = size[0] * size[1]
     directions = _directions(camera, size, np.arange(num_pixels, dtype=np.int32), _PIXEL_CENTER)
-    hits, glass_hits = (
-        trace_rays(embree, camera_position, directions, IGNORE_GLASS),
-        trace_glass(embree, camera_position, directions),
-    )
+    hits, glass_hits = _trace(embree, camera, directions, IGNORE_GLASS), _trace_glass(embree, camera, directions)
     edges = find_edges(stored_scene, hits, directions, size)
     if glass_hits is not None:
         edges = np.union1d(edges, find_edges(stored_scene, glass_hits, directions, size)).astype(np.int32)
@@ -155,12 +152,10 @@ def trace_primary(
     owner = np.repeat(edges, num_samples)
     if len(owner):
         edge_directions = _directions(camera, size, edges, EDGE_SAMPLE_POSITIONS[:num_samples])
-        hits = Hits.concatenate([hits, trace_rays(embree, camera_position, edge_directions, IGNORE_GLASS)])
+        hits = Hits.concatenate([hits, _trace(embree, camera, edge_directions, IGNORE_GLASS)])
         directions = np.concatenate([directions, edge_directions])
     if glass_hits is not None:
-        glass_hits = Hits.concatenate(
-            [glass_hits, trace_rays(embree, camera_position, directions[num_pixels:], STOP_AT_OPAQUE)]
-        )
+        glass_hits = Hits.concatenate([glass_hits, _trace(embree, camera, directions[num_pixels:], STOP_AT_OPAQUE)])
     return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, owner, glass_rules)
 
 
@@ -181,12 +176,20 @@ def trace_through_glass(
     Returns:
         k rays for each pixel in succession, as if each ray were a pixel.
     """
-    camera_position, directions = camera.to_world[:3, 3].astype(np.float32), _directions(camera, size, pixels, offsets)
-    hits, glass_hits = (
-        trace_rays(embree, camera_position, directions, IGNORE_GLASS),
-        trace_glass(embree, camera_position, directions),
-    )
+    directions = _directions(camera, size, pixels, offsets)
+    hits, glass_hits = _trace(embree, camera, directions, IGNORE_GLASS), _trace_glass(embree, camera, directions)
     return _make_gbuffer(stored_scene, embree, directions, hits, glass_hits, np.empty(0, np.int32), glass_rules)
+
+
+def _trace(embree: EmbreeScene, camera: Camera, directions: F32, alpha_sample: np.float32) -> Hits:
+    """Find the first hits behind a camera's near plane."""
+    start = near_distances(camera, directions)
+    return trace_rays(embree, camera.to_world[:3, 3].astype(np.float32), directions, alpha_sample, start)
+
+
+def _trace_glass(embree: EmbreeScene, camera: Camera, directions: F32) -> Hits | None:
+    """Find the first hits including glass; None if the scene has no glass."""
+    return _trace(embree, camera, directions, STOP_AT_OPAQUE) if has_glass(embree) else None
 
 
 def _make_gbuffer(

@@ -223,6 +223,6 @@ def _is_same_camera(first: SizedCamera, second: SizedCamera) -> bool:
     (camera, size), (second_camera, second_size) = first, second
     return bool(
         size == second_size
-        and camera.yfov == second_camera.yfov
+        and (camera.yfov, camera.near) == (second_camera.yfov, second_camera.near)
         and np.array_equal(camera.to_world, second_camera.to_world)
     )

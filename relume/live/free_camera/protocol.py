@@ -25,6 +25,8 @@ from relume.look import EnvironmentKey, LightGeometry
 from relume.look.model import Rgb
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.interior import Obstacle, Surroundings
+from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
 
 F32 = NDArray[np.float32]
@@ -52,6 +54,19 @@ class FreeCameraTransfer(OpenBake, Protocol):
     @property
     def positions(self) -> Shaped[F32, "corners 3"]:
         """Positions of triangle corners, meters."""
+        ...
+
+    @property
+    def interior_camera(self) -> Camera | None:
+        """A camera in the largest room; None if no place in the scene is enclosed."""
+        ...
+
+    def first_obstacle(self, path: Shaped[NDArray[np.float64], "points 3"]) -> Obstacle | None:
+        """Find the first surface on a path. See `relume.raytrace.interior`."""
+        ...
+
+    def surroundings(self, position: Shaped[NDArray[np.float64], " 3"]) -> Surroundings:
+        """Find the surfaces around a point. See `relume.raytrace.interior`."""
         ...
 
     @property

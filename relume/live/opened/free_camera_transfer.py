@@ -40,8 +40,11 @@ from relume.methods.store_layout import BakedError, read_free_camera_error
 from relume.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import RayPattern
+from relume.raytrace.interior import Obstacle, Surroundings, find_surroundings, first_obstacle, interior_camera
+from relume.raytrace.scene_buffers import ray_epsilon
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility import select_visibility
+from relume.scene.model import Camera
 from relume.store.bake_protocol import StoreReader
 from relume.transport.clustered_rays import shared_direction_coefficients, weighted_basis
 from relume.transport.direction_bins import DirectionBins, outgoing_bins
@@ -172,6 +175,20 @@ class BakedFreeCamera:
     def positions(self) -> Shaped[F32, "vertices 3"]:
         """Vertex positions of the triangles, meters."""
         return self.light_transport.local.positions
+
+    @cached_property
+    def interior_camera(self) -> Camera | None:
+        """A camera in the largest room; None if no place in the scene is enclosed."""
+        bounds = next(iter(self.views.values())).bounds
+        return interior_camera(self.embree, self.stored_scene.face_normal, bounds, "inside")
+
+    def first_obstacle(self, path: Shaped[NDArray[np.float64], "points 3"]) -> Obstacle | None:
+        """Find the first surface on a path. path: corners of a polyline, meters"""
+        return first_obstacle(self.embree, path, ray_epsilon(self.positions))
+
+    def surroundings(self, position: Shaped[NDArray[np.float64], " 3"]) -> Surroundings:
+        """Find the surfaces around a point. position: meters"""
+        return find_surroundings(self.embree, self.stored_scene.face_normal, position[None])[0]
 
     @cached_property
     def occlusion_mesh(self) -> OcclusionMesh:

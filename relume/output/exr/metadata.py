@@ -57,6 +57,7 @@ def build_attributes(
     """
     environment = look.environment.map
     camera_document = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
+    camera_document |= {"near": camera.near} if camera.near else {}
     return {
         "Software": f"relume {version('relume')}",
         "chromaticities": np.array(space.chromaticities),

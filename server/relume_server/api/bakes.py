@@ -19,7 +19,6 @@ from relume.assets.environments.thumbnail import thumbnail
 from relume.core.errors import NotFoundError
 from relume.image_io.write_image import png_bytes
 from relume.live.fixed_camera.protocols import CameraMode, FixedViewTransfer
-from relume.scene.custom_camera import make_custom_camera
 from relume.store.bake_protocol import Plan, Recipe
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import Caller, CallerDep
@@ -186,10 +185,7 @@ def require_ready_bake(services: Services, bake: str) -> BakeStatus:
 def _recipe(request: BakeRequest, services: Services) -> Recipe:
     """Make the recipe: the preset, overridden by the request; by default all views of the file."""
     ledger = services.bakes.ledger
-    requested_views = [
-        view if isinstance(view, str) else make_custom_camera(view.name, view.to_world, view.yfov)
-        for view in request.views or ()
-    ]
+    requested_views = [view if isinstance(view, str) else view.custom_camera(view.name) for view in request.views or ()]
     views, cameras = resolve_views(ledger, get_scene(ledger, request.scene), requested_views)
     preset = PRESETS[request.preset or "good"]
     num_lights = request.lights or preset.num_lights

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
 from relume.core.errors import NotFoundError
-from relume.scene.custom_camera import make_custom_camera
 from relume.scene.scene_folder import load_cameras
 from relume_server.api.pagination import PageDep
 from relume_server.schemas.base import MAX_NAME, Id
@@ -41,7 +39,7 @@ def get_camera(scene: Id, name: CameraName, services: ServicesDep) -> CameraEntr
 @router.put("/{name}", status_code=204, responses={201: {"description": "Created"}, 204: {"description": "Replaced"}})
 def put_camera(scene: Id, name: CameraName, frame: CameraFrame, services: ServicesDep) -> Response:
     """Store a camera under a name: 201 if it is new. Bakes of its previous version are unchanged."""
-    is_new = store_camera(services.bakes.ledger, scene, make_custom_camera(name, frame.to_world, frame.yfov))
+    is_new = store_camera(services.bakes.ledger, scene, frame.custom_camera(name))
     return Response(status_code=201 if is_new else 204)
 
 
@@ -55,7 +53,7 @@ def delete_placed_camera(scene: Id, name: CameraName, services: ServicesDep) -> 
 def _entries(scene: str, services: Services) -> list[CameraEntry]:
     record = get_scene(services.bakes.ledger, scene)
     scene_cameras = [
-        CameraEntry(name=c.name, to_world=c.to_world.ravel().tolist(), yfov=math.degrees(c.yfov), is_placed=False)
+        CameraEntry(**CameraFrame.from_camera(c).model_dump(), name=c.name, is_placed=False)
         for c in load_cameras(fetch_if_missing(scene_path(services.settings.data, record.id)))
     ]
     placed_cameras = list_cameras(services.bakes.ledger, record.id)

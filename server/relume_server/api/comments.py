@@ -8,7 +8,6 @@ from fastapi import APIRouter, Path, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume.core.errors import ParameterError
-from relume.scene.custom_camera import make_custom_camera
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.pagination import PageDep
 from relume_server.auth.roles import Caller, CallerDep
@@ -56,7 +55,7 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
     if request.x >= request.size[0] or request.y >= request.size[1]:
         raise ParameterError("/x", [request.x, request.y], "a pixel inside size")
     if request.camera is not None:
-        make_custom_camera("camera", request.camera.to_world, request.camera.yfov)
+        request.camera.custom_camera("camera")
     picture = None if request.picture is None else small_picture(request.picture)
     pin = request.model_dump(include={"bake", "view", "x", "y", "size", "camera"})
     author = caller.person or check_person(request.author or "Guest")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
@@ -20,7 +19,13 @@ from relume_server.api.bakes import require_ready_bake
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import PageDep
 from relume_server.auth.roles import Caller, CallerDep
-from relume_server.batch.frame_sequence import check_animation, look_at_frame, look_document_at_frame, with_pivot
+from relume_server.batch.frame_sequence import (
+    check_animation,
+    crossed_material,
+    look_at_frame,
+    look_document_at_frame,
+    with_pivot,
+)
 from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
@@ -94,7 +99,8 @@ def _frame_looks(request: LooksRequest, transfer: OpenBake) -> LooksBody:
         num_chars += len(json.dumps(documents[-1]))
         if num_chars > MAX_LISTED_BYTES:
             raise ParameterError("frames", request.num_frames, f"at most {index} frames with looks of this size")
-    return LooksBody(looks=documents, cameras=cameras)
+    crosses = None if request.view is None else crossed_material(request, request.view, transfer)
+    return LooksBody(looks=documents, cameras=cameras, crosses=crosses)
 
 
 def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame] | None:
@@ -103,9 +109,7 @@ def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame
         raise ParameterError("view", None, "the view of the path")
     baked_view(request.view, transfer)
     cameras = [camera for camera in check_animation(request, request.view, transfer) if camera is not None]
-    return [
-        CameraFrame(to_world=camera.to_world.ravel().tolist(), yfov=math.degrees(camera.yfov)) for camera in cameras
-    ] or None
+    return [CameraFrame.from_camera(camera) for camera in cameras] or None
 
 
 def _check_looks(request: Keyframes, transfer: OpenBake) -> None:

@@ -12,7 +12,6 @@ from relume.assets.environments.environment_names import environment_exists
 from relume.assets.measured.measured_store import STORE as MEASURED
 from relume.core.errors import NotFoundError
 from relume.live.fixed_camera.protocols import OpenBake
-from relume.scene.custom_camera import make_custom_camera
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.pagination import PageDep, newest
 from relume_server.api.renders import baked_view, check_look, check_picture_size
@@ -44,7 +43,7 @@ def _complete(request: ShareRequest, transfer: OpenBake) -> dict[str, Any]:
     for name in {request.view, *request.views, *request.cameras, *request.sizes}:
         baked_view(name, transfer)
     for name, frame in request.cameras.items():
-        make_custom_camera(name, frame.to_world, frame.yfov)
+        frame.custom_camera(name)
     for size in request.sizes.values():
         check_picture_size(size)
     check_look(request.look, transfer, "/look")

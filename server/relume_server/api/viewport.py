@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import io
-import math
 
 from fastapi import APIRouter, Response
 from fastapi.concurrency import run_in_threadpool
 from PIL import Image
 
-from relume.scene.custom_camera import make_custom_camera
-from relume.scene.model import Camera
 from relume_server.runtime.protocols import PlacementViewport
 from relume_server.schemas.base import Id
-from relume_server.schemas.cameras import CameraFrame, PickBody, ViewportBody, ViewportPixel, ViewportRequest
+from relume_server.schemas.cameras import (
+    CameraFrame,
+    PathBody,
+    PathRequest,
+    PickBody,
+    ViewportBody,
+    ViewportPixel,
+    ViewportRequest,
+)
 from relume_server.services import Services, ServicesDep
 from relume_worker.paths import scene_path
 from relume_worker.scenes import get_scene
@@ -33,17 +38,20 @@ class JpegResponse(Response):
 async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
     """Bounds of a scene; reads the scene, which may take seconds."""
     viewport = await _open_viewport(scene, services)
-    framing = viewport.default_camera
-    frame = CameraFrame(to_world=framing.to_world.ravel().tolist(), yfov=math.degrees(framing.yfov))
+    interior = viewport.interior_camera
     return ViewportBody(
-        bounds_min=viewport.bounds_min.tolist(), bounds_max=viewport.bounds_max.tolist(), default_camera=frame
+        bounds_min=viewport.bounds_min.tolist(),
+        bounds_max=viewport.bounds_max.tolist(),
+        default_camera=CameraFrame.from_camera(viewport.default_camera),
+        interior_camera=None if interior is None else CameraFrame.from_camera(interior),
+        opens_inside=viewport.opens_inside,
     )
 
 
 @router.post("", response_class=JpegResponse, name="draw_viewport")
 async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep) -> JpegResponse:
     """Image of a camera in plain colors."""
-    camera, viewport = _camera(view), await _open_viewport(scene, services)
+    camera, viewport = view.custom_camera("finder").camera, await _open_viewport(scene, services)
 
     def encode_jpeg() -> bytes:
         file = io.BytesIO()
@@ -56,16 +64,20 @@ async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep)
 @router.post("/pick", name="pick_in_viewport")
 async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBody:
     """Surface point at a pixel of such an image."""
-    camera, viewport = _camera(pixel), await _open_viewport(scene, services)
+    camera, viewport = pixel.custom_camera("finder").camera, await _open_viewport(scene, services)
     position = await run_in_threadpool(viewport.point_at, camera, pixel.size, pixel.x, pixel.y)
     return PickBody(position=None if position is None else position.tolist())
+
+
+@router.post("/path", name="first_obstacle_in_viewport")
+async def first_obstacle(scene: Id, path: PathRequest, services: ServicesDep) -> PathBody:
+    """First surface on a path, which stops a camera."""
+    viewport = await _open_viewport(scene, services)
+    length, material, normal = await run_in_threadpool(viewport.first_obstacle, path.points)
+    return PathBody(length=length, material=material, normal=normal)
 
 
 async def _open_viewport(scene: str, services: Services) -> PlacementViewport:
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     folder = scene_path(services.settings.data, record.id)
     return await services.pictures.run(("finder", folder), lambda: services.live.library.open_viewport(folder))
-
-
-def _camera(frame: CameraFrame) -> Camera:
-    return make_custom_camera("finder", frame.to_world, frame.yfov).camera

@@ -13,7 +13,6 @@ from relume.live.fixed_camera.protocols import CameraMode, CameraView, OpenBake
 from relume.look import Look
 from relume.look.interpolate import enclosing_keyframes, interpolate_looks
 from relume.look.rotate import rotated_environment, rotated_lights
-from relume.scene.custom_camera import make_custom_camera
 from relume_server.schemas.bodies import ComparisonRequest
 from relume_server.schemas.cameras import CameraFrame
 from relume_server.schemas.renders import Animation, CameraPath, Keyframes, LooksRequest, Turntable
@@ -24,6 +23,8 @@ if TYPE_CHECKING:
     from relume.live.free_camera.free_view import FreeView
     from relume.live.free_camera.protocol import FreeCameraTransfer
     from relume.scene.model import Camera
+
+_MIN_PATH_POINTS = 64
 
 
 def check_animation(request: Animation, view: str, transfer: OpenBake) -> Sequence[Camera | None]:
@@ -74,8 +75,28 @@ def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Ca
     return interpolate_cameras([_camera_of_frame(view, frame) for frame in request.path.cameras], request.num_frames)
 
 
+def crossed_material(request: Animation, name: str, transfer: OpenBake) -> str | None:
+    """Return the material of the first surface that the camera's path crosses; None if it crosses none, or is fixed.
+
+    Args:
+        request: the animation. name: of the view. transfer: the bake.
+    """
+    path = request.path
+    if path is None or transfer.camera_mode is not CameraMode.FREE or _has_fixed_camera(path):
+        return None
+    if isinstance(path, Turntable):  # chords of few frames would cut through what a turn goes around
+        path = path.model_copy(update={"turntable": max(path.turntable, _MIN_PATH_POINTS)})
+    cameras = [camera for camera in cameras_of(request.model_copy(update={"path": path}), name, transfer) if camera]
+    corners = [*cameras, cameras[0]] if isinstance(path, Turntable) else cameras
+    free_camera = cast("FreeCameraTransfer", transfer)
+    obstacle = free_camera.first_obstacle(np.array([camera.to_world[:3, 3] for camera in corners]))
+    if obstacle is None:
+        return None
+    return free_camera.material_names[int(free_camera.stored_scene.face_material[obstacle.face])]
+
+
 def _camera_of_frame(view: CameraView, frame: CameraFrame) -> Camera:
-    return make_custom_camera(view.name, frame.to_world, frame.yfov).camera
+    return frame.custom_camera(view.name).camera
 
 
 def comparison_camera(request: ComparisonRequest, transfer: OpenBake) -> tuple[Camera, tuple[int, int]]:

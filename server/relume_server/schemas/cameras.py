@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from typing import Annotated, Self
 
 from pydantic import Field
 
+from relume.scene.custom_camera import CustomCamera, make_custom_camera
+from relume.scene.model import Camera
 from relume_server.schemas.base import Body, Name
 
+MAX_PATH_POINTS = 64
+PathCoordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+PathPoint = tuple[PathCoordinate, PathCoordinate, PathCoordinate]
 ViewportSide = Annotated[int, Field(ge=16, le=1024)]
 
 
@@ -15,10 +21,21 @@ class CameraFrame(Body):
     """Pose and field of view of a camera.
 
     `to_world`: camera to world, 16 numbers, row by row, looking along -Z; scale is removed. `yfov`: vertical, degrees.
+    `near`: distance of the near clipping plane, meters; light and shadows are those of the whole scene.
     """
 
     to_world: Annotated[list[float], Field(min_length=16, max_length=16)]
     yfov: float
+    near: float = 0.0
+
+    @classmethod
+    def from_camera(cls, camera: Camera) -> Self:
+        """Describe a camera."""
+        return cls(to_world=camera.to_world.ravel().tolist(), yfov=math.degrees(camera.yfov), near=camera.near)
+
+    def custom_camera(self, name: str) -> CustomCamera:
+        """Validate it. Raises ParameterError."""
+        return make_custom_camera(name, self.to_world, self.yfov, self.near)
 
 
 class CameraBody(CameraFrame):
@@ -34,11 +51,30 @@ class CameraEntry(CameraBody):
 
 
 class ViewportBody(Body):
-    """Bounds of a scene, meters, and a camera that sees all of it."""
+    """Bounds of a scene, meters; a camera that sees all of it; one in its largest room, null if nothing is enclosed.
+
+    `opens_inside`: the scene is a closed room that its first camera sees only from outside.
+    """
 
     bounds_min: list[float]
     bounds_max: list[float]
     default_camera: CameraFrame
+    interior_camera: CameraFrame | None
+    opens_inside: bool
+
+
+class PathRequest(Body):
+    """Corners of a path, meters."""
+
+    points: Annotated[list[PathPoint], Field(min_length=2, max_length=MAX_PATH_POINTS)]
+
+
+class PathBody(Body):
+    """The first surface on a path: path `length` to it, meters, its material and unit normal; null without one."""
+
+    length: float | None
+    material: str | None
+    normal: tuple[float, float, float] | None
 
 
 class ViewportRequest(CameraFrame):

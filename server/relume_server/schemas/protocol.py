@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.validate import MAX_LIGHTS
+from relume_server.schemas.cameras import MAX_PATH_POINTS, PathPoint
 from relume_server.schemas.connection import DrainMessage, OpenMessage, PingMessage, PongMessage
 from relume_server.schemas.message import Message, Name, PatchOperation, Pointer, Revision, RoleName
 from relume_server.schemas.rooms import CommentsMessage, PresenceMessage, RoomInfo, RoomMessage, RoomUpdate
@@ -122,6 +123,14 @@ class InspectMessage(Message):
     y: Pixel
 
 
+class PathMessage(Message):
+    """client → server: find the first surface on a path of a "free" camera; see `PathAnswer`. `id` is repeated."""
+
+    type: Literal["path"]
+    id: Revision
+    points: Annotated[list[PathPoint], Field(min_length=2, max_length=MAX_PATH_POINTS)]
+
+
 class HighlightMessage(Message):
     """client → server: show the pixels that a curve's interval affects; each visible view answers "highlight"."""
 
@@ -151,8 +160,8 @@ class PrepareMessage(Message):
 
 class CameraMessage(Message):
     """client → server: move the "free" camera of a view, with this image size; the latest message counts, and frames
-    repeat its `seq` as `camera_seq`. `to_world`, row by row, and `yfov` as in `CameraInfo`. `active_control`: as in an
-    edit; nothing is prepared for it. `refine`: "exact": an exact image follows when the camera stops, and edits
+    repeat its `seq` as `camera_seq`. `to_world`, row by row, `yfov` and `near` as in `CameraInfo`. `active_control`: as
+    in an edit; nothing is prepared for it. `refine`: "exact": an exact image follows when the camera stops, and edits
     continue in it; "none": none follows.
     """
 
@@ -161,6 +170,7 @@ class CameraMessage(Message):
     seq: Revision
     to_world: Annotated[list[Coordinate], Field(min_length=16, max_length=16)]
     yfov: Annotated[float, Field(gt=0, lt=math.pi, allow_inf_nan=False)]
+    near: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     size: tuple[Pixel, Pixel]
     active_control: Pointer | None = None
     refine: Literal["exact", "none"] = "exact"
@@ -186,6 +196,7 @@ ClientMessage = Annotated[
     | AckMessage
     | EncodingMessage
     | InspectMessage
+    | PathMessage
     | HighlightMessage
     | PrepareMessage
     | CameraMessage
@@ -209,15 +220,18 @@ class Problem(BaseModel):
 
 
 class CameraInfo(Message):
-    """A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians."""
+    """A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians.
+    `near`: distance of the near clipping plane, meters.
+    """
 
     to_world: list[float]
     yfov: float
+    near: float = 0.0
 
 
 class ViewInfo(Message):
     """A view, its size in pixels and its camera; `camera_mode`: fixed at the baked camera, or free. For a free camera
-    `bounds` are the minimum and maximum corner of the scene, meters.
+    `bounds` are the minimum and maximum corner of the scene, meters, and `interior_camera` is in its largest room.
     """
 
     name: str
@@ -226,6 +240,7 @@ class ViewInfo(Message):
     camera: CameraInfo
     camera_mode: Literal["fixed", "free"]
     bounds: tuple[list[float], list[float]] | None = None
+    interior_camera: CameraInfo | None = None
 
 
 class FreeCameraError(Message):
@@ -308,6 +323,21 @@ class InspectAnswer(Message):
     bands: list[list[float]] | None
 
 
+class PathAnswer(Message):
+    """server → client: `length` of a path to its first surface, meters, with its material and unit normal; null if the
+    path is free.
+
+    `solid`: material of the closed surface that its last point is in, as inside a wall; null in rooms and in the open.
+    """
+
+    type: Literal["path"] = "path"
+    id: Revision
+    length: float | None
+    material: str | None
+    normal: tuple[float, float, float] | None
+    solid: str | None
+
+
 class CurveMessage(Message):
     """server → client: the active curve at this revision, band averages per channel, over 0…`max_degrees`."""
 
@@ -336,6 +366,7 @@ ServerMessage = (
     | StatusMessage
     | ProblemMessage
     | InspectAnswer
+    | PathAnswer
     | CurveMessage
     | BakeMessage
     | DrainMessage

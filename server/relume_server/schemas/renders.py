@@ -96,10 +96,14 @@ class LooksRequest(Animation):
 
 
 class LooksBody(Body):
-    """Complete look and camera of each frame; cameras are null without a `path`."""
+    """Complete look and camera of each frame; cameras are null without a `path`.
+
+    `crosses`: material of the first surface that the camera's path crosses, null if there is none.
+    """
 
     looks: list[dict[str, Any]]
     cameras: list[CameraFrame] | None
+    crosses: str | None
 
 
 class RenderRequest(Animation):

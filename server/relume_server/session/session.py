@@ -14,6 +14,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.core.errors import RelumeError
 from relume.live.fixed_camera.protocols import CameraMode, CameraView, OpenBake
+from relume.scene.model import Camera
 from relume_server.auth.audit import Audit
 from relume_server.auth.services import PROXY_REVALIDATION_S, AuthServices
 from relume_server.client_state.flow_control import FrameWindow
@@ -44,6 +45,7 @@ from relume_worker.database.failures import DATABASE_ERRORS, describe_error
 
 if TYPE_CHECKING:
     from relume.live.free_camera.free_view import FreeView
+    from relume.live.free_camera.protocol import FreeCameraTransfer
     from relume.live.opened.free_camera_transfer import BakedFreeCamera
 
 log = logging.getLogger(__name__)
@@ -197,15 +199,24 @@ def _free_camera_error(transfer: OpenBake) -> FreeCameraError | None:
 
 
 def _view_info(view: CameraView, transfer: OpenBake) -> ViewInfo:
-    camera = CameraInfo(to_world=view.camera.to_world.ravel().tolist(), yfov=view.camera.yfov)
-    bounds = None
+    bounds = interior = None
     if transfer.camera_mode is CameraMode.FREE:
         lowest, highest = cast("FreeView", view).bounds
         bounds = lowest.tolist(), highest.tolist()
-    camera_mode = transfer.camera_mode.value
+        interior = cast("FreeCameraTransfer", transfer).interior_camera
     return ViewInfo(
-        name=view.name, width=view.width, height=view.height, camera=camera, camera_mode=camera_mode, bounds=bounds
+        name=view.name,
+        width=view.width,
+        height=view.height,
+        camera=_camera_info(view.camera),
+        camera_mode=transfer.camera_mode.value,
+        bounds=bounds,
+        interior_camera=None if interior is None else _camera_info(interior),
     )
+
+
+def _camera_info(camera: Camera) -> CameraInfo:
+    return CameraInfo(to_world=camera.to_world.ravel().tolist(), yfov=camera.yfov, near=camera.near)
 
 
 async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:

@@ -15,7 +15,8 @@ import { availableExrSpace } from "../../state/color";
 import { look } from "../../state/look";
 import { scene } from "../../state/scene";
 import { activeViewName } from "../../state/views";
-import { reportErrors } from "../../ui/toasts";
+import { interpolateLooks } from "../../session/net/api";
+import { reportErrors, showError, showNote } from "../../ui/toasts";
 import { encodePng } from "./displayImage";
 import { download, renderAndSave } from "./renderJob";
 
@@ -100,8 +101,25 @@ export type RenderQuality = NonNullable<RenderRequest["quality"]>;
 export type TurntableRotation = NonNullable<Turntable["rotate"]>;
 export const turntableRotation = signal<TurntableRotation>("camera");
 
+export const crossingText = (material: string): string =>
+  `The camera passes through “${material}” on its way; frames behind it show it from outside.`;
+
+/** Tell if the camera of a path passes through a surface, as around a closed room. */
+async function noteCrossing(path: Turntable): Promise<void> {
+  const id = bake.peek();
+  if (id === null) return;
+  const { crosses } = await interpolateLooks({
+    bake: id,
+    looks: [{}],
+    view: activeViewName.peek(),
+    path: { ...path, turntable: 1 },
+  });
+  if (crosses !== null) showNote(crossingText(crosses));
+}
+
 /** Export a full rotation from the current camera: a PNG sequence in a ZIP, or a video. */
 export function exportTurntable(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
   const path = { turntable: TURNTABLE_FRAMES, rotate: turntableRotation.value, start_camera: currentPose() };
+  void noteCrossing(path).catch(showError);
   return startExport("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, quality });
 }

@@ -8,7 +8,8 @@ import type { Look, LooksBody, LooksRequest, RenderRequest } from "../../protoco
 import { bake } from "../../state/bakes";
 import { timelineOpen } from "../../state/panels";
 import { activeViewName } from "../../state/views";
-import { reportErrors } from "../../ui/toasts";
+import { reportErrors, showNote } from "../../ui/toasts";
+import { crossingText } from "../looks/exportImage";
 import {
   interpolation,
   fewestKeyframes,
@@ -122,6 +123,14 @@ effect(() => {
   if (!isPlaying.value) freeCameraOf(activeViewName.peek())?.stop();
 });
 
+let lastCrossing: string | null = null;
+
+/** Tell once that the camera's path passes through a surface. */
+function noteCrossing(material: string | null): void {
+  if (material !== null && material !== lastCrossing) showNote(crossingText(material));
+  lastCrossing = material;
+}
+
 let newestRequest = 0;
 effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
@@ -144,6 +153,7 @@ effect(() => {
       const answer = await interpolateLooks({ bake: id, looks: looks.map((look) => ({ ...look })), path, ...body });
       if (requestNumber !== newestRequest) return;
       frameCameras.value = motion === "environment" ? null : answer.cameras; // the user may move the camera during an environment rotation
+      noteCrossing(answer.crosses);
       frameLookList.value = answer.looks as unknown as Look[];
       if (isPlayRequested) play();
       else if (previewedStep.peek() !== null) showPlayhead();

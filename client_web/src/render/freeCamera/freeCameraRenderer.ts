@@ -17,6 +17,8 @@ export interface RenderCamera {
   to_world: readonly number[];
   /** Radians. */
   yfov: number;
+  /** Distance of the near clipping plane, meters; 0: nothing is clipped. */
+  near: number;
 }
 
 /** A rendered image: RGB9_E5 pixels and, with a transparent background, the coverage of each. */
@@ -281,7 +283,7 @@ export class FreeCameraRenderer {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     gl.clear(gl.DEPTH_BUFFER_BIT);
-    const [near, far] = [NEAR_PLANE * this.size, FAR_PLANE * this.size];
+    const [near, far] = [Math.max(camera.near, NEAR_PLANE * this.size), FAR_PLANE * this.size + camera.near];
     for (const faces of this.faces) {
       const program = this.useProgramFor(faces, features);
       this.setBackgroundUniforms(program, numbers);

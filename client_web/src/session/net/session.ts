@@ -10,6 +10,7 @@ import type {
   Look,
   PatchOp,
   InspectAnswer,
+  PathAnswer,
   ProblemMessage,
   RoomMessage,
   RoomUpdate,
@@ -35,6 +36,7 @@ export interface SessionHandlers {
   status: (message: StatusMessage) => void;
   problem: (message: ProblemMessage, lastGood: Look | null) => void;
   inspect: (message: InspectAnswer) => void;
+  path: (message: PathAnswer) => void;
   curve: (message: CurveMessage) => void;
   bake: (message: BakeMessage) => void;
   room: (message: RoomMessage) => void;
@@ -83,6 +85,7 @@ export class Session {
       status: (message) => handlers.status(message),
       problem: (message) => handlers.problem(message, this.onProblem(message)),
       inspect: (message) => handlers.inspect(message),
+      path: (message) => handlers.path(message),
       curve: (message) => handlers.curve(message),
       bake: (message) => handlers.bake(message),
       room: (message) => handlers.room(message),

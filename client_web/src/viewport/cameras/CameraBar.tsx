@@ -1,4 +1,4 @@
-/** Bar over a free-camera image: camera controls, renderer choice, and camera options. */
+/** Bar below a free-camera image: camera controls, renderer choice, and camera options. */
 import { computed } from "@preact/signals";
 import { useState } from "preact/hooks";
 import {
@@ -10,14 +10,15 @@ import {
 } from "../../session/clientRendering";
 import { usesTexelShading } from "../../state/look";
 import { scene } from "../../state/scene";
-import { sideBySide, activeViewName, views } from "../../state/views";
+import { activeView, sideBySide, activeViewName, views } from "../../state/views";
 import { CameraMenu } from "./CameraMenu";
 import { freeCameraOf } from "./freeCamera";
-import { CAMERA_STEPS } from "./cameraSteps";
-import { orbitKeyStep } from "./useCameraControl";
+import { CAMERA_STEPS, NAVIGATION_HELP, NAVIGATION_LABELS } from "./cameraSteps";
+import { navigation, toggleNavigation } from "./navigation";
+import { cameraKeyStep } from "./useCameraControl";
 
 const BROWSER_TITLE =
-  "This browser draws while the camera moves, without network traffic. The server draws sharp shadows of the sun and of small " +
+  "This browser draws while the camera moves and loads no pictures. The server draws sharp shadows of the sun and of small " +
   "lights, contact lines and one-pixel highlights too; scenes with glass or cutouts are always the server's.";
 const SERVER_TITLE = "The server draws while the camera moves and streams each picture.";
 const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This browser", server: "Server" };
@@ -52,29 +53,40 @@ export function CameraBar() {
   const name = activeViewName.value;
   const moves = views.value.find((view) => view.name === name)?.camera_mode === "free";
   const freeCamera = moves ? freeCameraOf(name) : null;
-  const sceneId = scene.value?.id ?? null;
+  const [sceneId, mode] = [scene.value?.id ?? null, navigation.value];
+  void activeView.value; // re-render when the camera moves
   if (freeCamera === null) return null;
   return (
     <div class="camera-bar" role="group" aria-label="Camera">
-      <button
-        aria-expanded={open}
-        title="Drag: orbit · Shift or right-drag: pan · Wheel: dolly"
-        onClick={() => setOpen(!open)}
-      >
+      <button aria-expanded={open} title={NAVIGATION_HELP[mode]} onClick={() => setOpen(!open)}>
         {cameraMessage} {open ? "▾" : "▸"}
       </button>
       {open && (
         <>
-          {CAMERA_STEPS.map(({ key, sign, label }) => (
-            <button
-              key={key}
-              title={label}
-              aria-label={label}
-              onClick={() => orbitKeyStep(freeCamera.change, freeCamera.bounds, key, false)}
-            >
+          <button
+            aria-pressed={mode === "walk"}
+            title={`${NAVIGATION_HELP[mode === "walk" ? "orbit" : "walk"]} (O)`}
+            onClick={toggleNavigation}
+          >
+            {NAVIGATION_LABELS.walk}
+          </button>
+          {CAMERA_STEPS[mode].map(({ key, sign, label }) => (
+            <button key={key} title={label} aria-label={label} onClick={() => cameraKeyStep(freeCamera, key, false)}>
               {sign}
             </button>
           ))}
+          {freeCamera.interior !== null && (
+            <button title="Put the camera in the largest room (I)" onClick={() => freeCamera.goInside()}>
+              Inside
+            </button>
+          )}
+          <button
+            title="Return to the previous camera (B)"
+            disabled={!freeCamera.hasPrevious}
+            onClick={() => freeCamera.goBack()}
+          >
+            Back
+          </button>
           <button title="Return to the initial camera (Home)" onClick={() => freeCamera.restart()}>
             Reset view
           </button>

@@ -11,7 +11,8 @@ import { useDismiss } from "../../ui/useDismiss";
 import { nextCameraName, listCameras, MAX_NAME } from "./cameraRequests";
 import { moveFreeCamera, type FreeCamera } from "./freeCamera";
 import { saveCameraAs, removeCamera } from "./savedCameras";
-import { levelOrbit, MAX_YFOV, MIN_YFOV, withFieldOfView } from "./orbit";
+import { setStopsAtWalls, stopsAtWalls } from "./navigation";
+import { diagonalOf, levelOrbit, MAX_YFOV, MIN_YFOV, withFieldOfView, withNearPlane } from "./orbit";
 
 const MIN_SIDE = 16;
 const MAX_SIDE = 4096;
@@ -52,11 +53,17 @@ interface ListProps {
 
 function CameraList({ scene, freeCamera, name }: ListProps) {
   const [cameras, setCameras] = useState<CameraEntry[]>([]);
+  /** The new camera, whose name can be typed. */
+  const [created, setCreated] = useState<string | null>(null);
   const read = useCallback(async () => setCameras(await listCameras(scene)), [scene]);
   const run = (work: () => Promise<void>) => void reportErrors(work).then(() => reportErrors(read));
   useEffect(() => void reportErrors(read), [read]);
   const save = () =>
-    run(() => saveCameraAs(scene, nextCameraName(cameras.map((camera) => camera.name)), freeCamera.pose, null));
+    run(async () => {
+      const newName = nextCameraName(cameras.map((camera) => camera.name));
+      await saveCameraAs(scene, newName, freeCamera.pose, null);
+      setCreated(newName);
+    });
   const remove = (camera: CameraEntry) => run(() => removeCamera(scene, camera, () => void reportErrors(read)));
   return (
     <>
@@ -69,6 +76,8 @@ function CameraList({ scene, freeCamera, name }: ListProps) {
                 class="name"
                 name={camera.name}
                 maximum={MAX_NAME}
+                editing={camera.name === created}
+                onDone={() => setCreated(null)}
                 onRename={(to) => run(() => saveCameraAs(scene, to, camera, camera.name))}
               />
             ) : (
@@ -95,7 +104,11 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
   const escape = (event: KeyboardEvent) => event.key === "Escape" && setOpen(false);
   return (
     <div class="menu" ref={menu} onKeyDown={escape}>
-      <button aria-expanded={open} title="Field of view, size and saved cameras" onClick={() => setOpen(!open)}>
+      <button
+        aria-expanded={open}
+        title="Field of view, clipping, walls, size and saved cameras"
+        onClick={() => setOpen(!open)}
+      >
         Options ▾
       </button>
       {open && (
@@ -110,6 +123,24 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
             scale="log"
             onChange={(yfov) => freeCamera.change((now) => withFieldOfView(now, yfov))}
           />
+          <LabeledSlider
+            label="Clip near"
+            unit="m"
+            title="Hide surfaces nearer than this, as a wall in front of a room. Light and shadows stay."
+            value={freeCamera.orbit.near}
+            minimum={0}
+            maximum={Number(diagonalOf(freeCamera.bounds).toPrecision(3))}
+            scale="linear"
+            onChange={(near) => freeCamera.change((now) => withNearPlane(now, near))}
+          />
+          <label title="The camera stops at surfaces, unless you step through (J)">
+            <input
+              type="checkbox"
+              checked={stopsAtWalls.value}
+              onChange={(event) => setStopsAtWalls(event.currentTarget.checked)}
+            />
+            Stop at walls
+          </label>
           {Math.abs(freeCamera.orbit.roll) > UPRIGHT && (
             <button title="Remove the camera's roll" onClick={() => freeCamera.change(levelOrbit)}>
               Level horizon

@@ -4,7 +4,15 @@ import type { SceneBody, Triple } from "../../protocol";
 import type { BakeSize } from "../../session/scene/recipe";
 import { IconButton } from "../../ui/IconButton";
 import { LabeledSlider } from "../../ui/LabeledSlider";
-import { renderPlacement, nextCameraName, getPlacementView, listCameras, MAX_NAME, pickTarget } from "./cameraRequests";
+import {
+  getPlacementView,
+  listCameras,
+  MAX_NAME,
+  nextCameraName,
+  pickTarget,
+  renderPlacement,
+  tracePlacementPath,
+} from "./cameraRequests";
 import { saveCameraAs } from "./savedCameras";
 import { CameraMotion } from "./cameraMotion";
 import {
@@ -12,14 +20,19 @@ import {
   MAX_YFOV,
   MIN_YFOV,
   orbitOf,
+  diagonalOf,
   withFieldOfView,
+  withNearPlane,
   type Bounds,
   type CameraPose,
   type Orbit,
 } from "./orbit";
 import { PlacementImages } from "./placementImages";
-import { CAMERA_STEPS } from "./cameraSteps";
-import { orbitKeyStep, useCameraControl } from "./useCameraControl";
+import { CAMERA_STEPS, NAVIGATION_HELP, NAVIGATION_LABELS } from "./cameraSteps";
+import { navigation, setStopsAtWalls, stopsAtWalls, toggleNavigation, wallMargin } from "./navigation";
+import { cameraKeyStep, useCameraControl } from "./useCameraControl";
+import { Walker } from "./walker";
+import { WallGuard } from "./wallGuard";
 import "./cameras.css";
 
 const MOVING_SIZE: BakeSize = [400, 300];
@@ -40,19 +53,26 @@ interface PlacementStart {
   first: Orbit;
   /** An orbit that shows the whole scene. */
   overview: Orbit;
+  /** An orbit in the scene's largest room; null if nothing is enclosed. */
+  interior: Orbit | null;
 }
 
-/** The scene's bounds, and the initial orbit, by default of its first camera: it orbits the point in the image's
- * center. */
+/** The scene's bounds, and the initial orbit around the point in the image's center: by default of its first camera, or
+ * inside a room that this camera sees only from outside. */
 async function startPlacement(scene: string, from: CameraPose | null): Promise<PlacementStart> {
-  const [{ bounds_min, bounds_max, default_camera }, cameras] = await Promise.all([
+  const [{ bounds_min, bounds_max, default_camera, interior_camera, opens_inside }, cameras] = await Promise.all([
     getPlacementView(scene),
     listCameras(scene),
   ]);
   const bounds: Bounds = { lowest: bounds_min as Triple, highest: bounds_max as Triple };
-  const frame = from ?? cameras[0] ?? default_camera;
+  const frame = from ?? (opens_inside ? interior_camera : null) ?? cameras[0] ?? default_camera;
   const target = await pickTarget(scene, frame, IDLE_SIZE, IDLE_SIZE[0] / 2, IDLE_SIZE[1] / 2);
-  return { bounds, first: orbitOf(frame, bounds, target), overview: orbitOf(default_camera, bounds) };
+  return {
+    bounds,
+    first: orbitOf(frame, bounds, target),
+    overview: orbitOf(default_camera, bounds),
+    interior: interior_camera && orbitOf(interior_camera, bounds),
+  };
 }
 
 export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {
@@ -90,10 +110,12 @@ function usePlacementCamera(
   scene: string,
   canvas: { current: HTMLCanvasElement | null },
   first: Orbit,
+  bounds: Bounds,
   fail: (text: string) => void,
 ) {
   const [orbit, setOrbit] = useState(first);
-  const pipeline = useRef<{ motion: CameraMotion; images: PlacementImages } | null>(null);
+  const [wall, setWall] = useState<string | null>(null);
+  const pipeline = useRef<{ motion: CameraMotion; guard: WallGuard } | null>(null);
   useEffect(() => {
     const images = new PlacementImages(
       (frame, size) => renderPlacement(scene, frame, size),
@@ -112,19 +134,39 @@ function usePlacementCamera(
     const motion = new CameraMotion(first, (displayed, isLast) =>
       images.show(poseOf(displayed), isLast ? IDLE_SIZE : MOVING_SIZE),
     );
-    pipeline.current = { motion, images };
+    const guard = new WallGuard(wallMargin(bounds), {
+      now: () => motion.target,
+      accept: (accepted) => {
+        motion.change(() => accepted);
+        setOrbit(accepted);
+        setWall(null);
+      },
+      stop: ({ material }) => setWall(material),
+      trace: (points) => tracePlacementPath(scene, points),
+    });
+    pipeline.current = { motion, guard };
     images.show(poseOf(first), IDLE_SIZE);
     return () => {
+      guard.cancel();
       motion.end();
       images.close();
     };
-  }, [scene, canvas, first, fail]);
-  const change = (update: (orbit: Orbit) => Orbit) => {
-    const motion = pipeline.current?.motion;
-    motion?.change(update);
-    if (motion !== undefined) setOrbit(motion.target);
+  }, [scene, canvas, first, bounds, fail]);
+  /** Move through anything. */
+  const jump = (update: (orbit: Orbit) => Orbit) => {
+    if (pipeline.current === null) return;
+    const { motion, guard } = pipeline.current;
+    guard.cancel();
+    motion.change(update);
+    setOrbit(motion.target);
+    setWall(null);
   };
-  return { orbit, change };
+  const change = (update: (orbit: Orbit) => Orbit, slides = false) => {
+    const guard = pipeline.current?.guard;
+    if (stopsAtWalls.peek()) guard?.move(update(guard.goal), slides);
+    else jump(update);
+  };
+  return { orbit, wall, jump, camera: { bounds, change } };
 }
 
 interface PlacementProps extends PlacementStart {
@@ -133,15 +175,18 @@ interface PlacementProps extends PlacementStart {
   onSave: (name: string) => void;
 }
 
-function PlacementView({ scene, bounds, first, overview, name, onSave }: PlacementProps) {
+function PlacementView({ scene, bounds, first, overview, interior, name, onSave }: PlacementProps) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const [imageError, setImageError] = useState(""); // a later image does not resolve a rejected save
   const [saveError, setSaveError] = useState("");
   const [cameraName, setCameraName] = useState(name ?? nextCameraName(scene.views.map((view) => view.name)));
-  const { orbit, change } = usePlacementCamera(scene.id, canvas, first, setImageError);
+  const { orbit, wall, jump, camera } = usePlacementCamera(scene.id, canvas, first, bounds, setImageError);
+  const { change } = camera;
+  const mode = navigation.value;
   const field = useId();
 
-  const seeAll = () => change(() => overview);
+  const seeAll = () => jump(() => overview);
+  const goInside = () => interior !== null && jump(() => interior);
   const lookAt = async (u: number, v: number) => {
     setSaveError("");
     try {
@@ -161,7 +206,17 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
       setSaveError((error as Error).message);
     }
   };
-  const control = useCameraControl(change, bounds, (u, v) => void lookAt(u, v));
+  const steered = useRef(camera);
+  steered.current = camera;
+  const [walker] = useState(
+    () =>
+      new Walker(
+        () => (navigation.peek() === "walk" ? steered.current : null),
+        () => true,
+      ),
+  );
+  useEffect(() => () => walker.stop(), [walker]);
+  const control = useCameraControl(camera, (u, v) => void lookAt(u, v));
   return (
     <form onSubmit={(event) => void save(event)}>
       <canvas
@@ -170,23 +225,34 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
         height={IDLE_SIZE[1]}
         tabIndex={0}
         role="img"
-        aria-label="Camera view. Arrow keys: orbit. Shift+arrows: pan. + and −: dolly. F: show all."
+        aria-label="Camera view. Arrow keys: orbit, or turn and step. Shift+arrows: pan, or look up and down. + and −: dolly. O: walk or orbit. F: show all. I: inside."
         onKeyDown={(event) => {
-          if (event.key === "f" || event.key === "F") seeAll();
-          else if (!orbitKeyStep(change, bounds, event.key, event.shiftKey)) return;
+          const key = event.key.toLowerCase();
+          if (key === "f") seeAll();
+          else if (key === "i") goInside();
+          else if (key === "o") toggleNavigation();
+          else if (mode === "walk" && walker.press(event)) event.stopPropagation();
+          else if (!cameraKeyStep(camera, event.key, event.shiftKey)) return;
           event.preventDefault();
         }}
+        onKeyUp={(event) => walker.release(event)}
+        onBlur={() => walker.stop()}
         {...control}
       />
-      <p class="placement-help">Drag to orbit, Shift- or right-drag to pan, scroll to zoom, click to focus.</p>
+      <p class="placement-help" role="status">
+        {wall === null ? `${NAVIGATION_HELP[mode]} Click to focus.` : `“${wall}” stops the camera.`}
+      </p>
       <div class="placement-steps" role="group" aria-label="Move the camera">
-        {CAMERA_STEPS.map(({ key, sign, label }) => (
+        <button type="button" aria-pressed={mode === "walk"} title="Walk or orbit (O)" onClick={toggleNavigation}>
+          {NAVIGATION_LABELS.walk}
+        </button>
+        {CAMERA_STEPS[mode].map(({ key, sign, label }) => (
           <button
             key={key}
             type="button"
             title={label}
             aria-label={label}
-            onClick={() => orbitKeyStep(change, bounds, key, false)}
+            onClick={() => cameraKeyStep(camera, key, false)}
           >
             {sign}
           </button>
@@ -194,6 +260,19 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
         <button type="button" title="Show the whole scene (F)" onClick={seeAll}>
           Show all
         </button>
+        {interior !== null && (
+          <button type="button" title="Put the camera in the largest room (I)" onClick={goInside}>
+            Inside
+          </button>
+        )}
+        <label title="The camera stops at surfaces">
+          <input
+            type="checkbox"
+            checked={stopsAtWalls.value}
+            onChange={(event) => setStopsAtWalls(event.currentTarget.checked)}
+          />
+          Stop at walls
+        </label>
       </div>
       <LabeledSlider
         label="Field of view"
@@ -204,6 +283,16 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
         maximum={MAX_YFOV}
         scale="log"
         onChange={(yfov) => change((now) => withFieldOfView(now, yfov))}
+      />
+      <LabeledSlider
+        label="Clip near"
+        unit="m"
+        title="Hide surfaces nearer than this. Light and shadows stay."
+        value={orbit.near}
+        minimum={0}
+        maximum={Number(diagonalOf(bounds).toPrecision(3))}
+        scale="linear"
+        onChange={(near) => change((now) => withNearPlane(now, near))}
       />
       <div class="placement-keep">
         <label for={field}>Name</label>

@@ -3,26 +3,55 @@ import { effect } from "@preact/signals";
 import { connections, sendToShown } from "../../session/connections";
 import { limitRenderSize } from "../../session/clientRenderer";
 import { renderIfPossible, isMoving, setMoving } from "../../session/clientRendering";
+import { tracePath } from "../../session/pathTracing";
 import { requestPixelProbe } from "../../session/pixelProbe";
 import type { HelloMessage, Triple } from "../../protocol";
 import { bake } from "../../state/bakes";
 import { connection } from "../../state/connection";
-import { storeCamera } from "../../state/cameras";
+import { isCameraMoving, storeCamera } from "../../state/cameras";
 import { scene } from "../../state/scene";
 import { shownViews, views } from "../../state/views";
+import { length, scale, subtract, add } from "../../panels/lights/vector";
+import { showError, showNote } from "../../ui/toasts";
 import { CameraMotion } from "./cameraMotion";
-import { poseOf, isClose, orbitOf, type Bounds, type CameraPose, type Orbit } from "./orbit";
+import { stopsAtWalls, wallMargin, type Steerable } from "./navigation";
+import {
+  diagonalOf,
+  forwardOf,
+  isClose,
+  orbitOf,
+  poseOf,
+  positionOf,
+  translateOrbit,
+  type Bounds,
+  type CameraPose,
+  type Orbit,
+} from "./orbit";
+import { WallGuard, type Wall } from "./wallGuard";
 
 type View = HelloMessage["views"][number];
 
 const DEGREES = 180 / Math.PI;
+const GESTURE_MS = 800; // changes closer together are one step of Back
+const MAX_PREVIOUS = 50;
+const MAX_LAYERS = 8; // surfaces of a wall to step through
 
 export type ViewSize = [width: number, height: number];
 
+const toDegrees = ({ to_world, yfov, near }: View["camera"]): CameraPose => ({ to_world, yfov: yfov * DEGREES, near });
+
 /** The free camera of one view of one bake. */
-export class FreeCamera {
+export class FreeCamera implements Steerable {
   readonly first: CameraPose;
   readonly bounds: Bounds;
+  /** A camera in the scene's largest room; null if nothing is enclosed. */
+  readonly interior: CameraPose | null;
+  private readonly guard: WallGuard;
+  /** Poses before each gesture, for Back. */
+  private previous: Orbit[] = [];
+  private lastChange = -Infinity;
+  /** The surface that has stopped the camera, until it moves on. */
+  private wall: Wall | null = null;
   private readonly initialOrbit: Orbit;
   private motion: CameraMotion;
   private number = 0;
@@ -41,16 +70,28 @@ export class FreeCamera {
       [1, 1, 1],
     ];
     this.bounds = { lowest: lowest as Triple, highest: highest as Triple };
-    this.first = { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES };
+    this.first = toDegrees(view.camera);
+    this.interior = view.interior_camera ? toDegrees(view.interior_camera) : null;
     this.initialOrbit = orbitOf(this.first, this.bounds);
     const { orbit, size } = this.load();
     this.hasMoved = orbit !== null;
     this.sizeOverride = size;
     this.motion = this.createMotion(orbit ?? this.initialOrbit);
+    this.guard = new WallGuard(wallMargin(this.bounds), {
+      now: () => this.motion.target,
+      accept: (accepted) => this.moveTo(() => accepted),
+      stop: (wall) => this.onWall(wall),
+      trace: tracePath,
+    });
   }
 
   get orbit(): Orbit {
-    return this.motion.target;
+    return this.guard.goal;
+  }
+
+  /** True if the camera was elsewhere before. */
+  get hasPrevious(): boolean {
+    return this.previous.length > 0;
   }
 
   /** The chosen image size, if any. */
@@ -69,12 +110,55 @@ export class FreeCamera {
     this.report(this.pose);
   }
 
-  change = (update: (orbit: Orbit) => Orbit): void => {
-    this.hasMoved = true;
-    this.playbackPose = null;
-    this.motion.change(update);
-    this.save();
+  /** Move as far as no wall is in the way. */
+  change = (update: (orbit: Orbit) => Orbit, slides = false): void => {
+    this.remember();
+    if (stopsAtWalls.peek()) this.guard.move(update(this.guard.goal), slides);
+    else this.moveTo(update);
   };
+
+  /** Move through anything, as to a saved camera. */
+  jump(update: (orbit: Orbit) => Orbit): void {
+    this.lastChange = -Infinity; // a step of its own
+    this.remember();
+    this.lastChange = -Infinity;
+    this.guard.cancel();
+    this.moveTo(update);
+    void this.reportSolid();
+  }
+
+  /** Return to where the camera was before the last gesture. */
+  goBack(): void {
+    const pose = this.previous.pop();
+    if (pose === undefined) return showNote("There is no previous camera.");
+    this.guard.cancel();
+    this.lastChange = -Infinity;
+    return this.moveTo(() => pose);
+  }
+
+  /** Move into the scene's largest room. */
+  goInside(): void {
+    const { interior } = this;
+    if (interior === null) return showNote("No place in this scene is enclosed by surfaces.");
+    return this.jump(() => orbitOf(interior, this.bounds));
+  }
+
+  /** Move behind the wall that has stopped the camera, else behind the surface in front of it. */
+  async stepThrough(): Promise<void> {
+    const [from, gap] = [positionOf(this.orbit), 2 * wallMargin(this.bounds)];
+    const direction = this.wall?.direction ?? forwardOf(this.orbit);
+    const reach = scale(direction, 2 * diagonalOf(this.bounds) + length(from));
+    let position = from;
+    for (let layer = 0; layer < MAX_LAYERS; layer++) {
+      const { length: free } = await tracePath([position, add(position, reach)]);
+      if (free === null) break;
+      position = add(position, scale(direction, free + gap));
+      if ((await tracePath([position, position])).solid === null) break; // otherwise inside the wall
+    }
+    if (position === from) return showNote("No surface is in front of the camera.");
+    this.wall = null;
+    return this.jump((orbit) => translateOrbit(orbit, subtract(position, from)));
+  }
 
   /** Orbit around the point in the image's center; if unknown, keep the target. */
   async grab(): Promise<void> {
@@ -87,6 +171,11 @@ export class FreeCamera {
     if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position));
   }
 
+  /** Before a turn of the wheel: dolly towards the point in the image's center. */
+  beginDolly(): void {
+    if (performance.now() - this.lastChange > GESTURE_MS) void this.grab();
+  }
+
   /** Focus on a point. */
   lookAt(target: Triple): void {
     this.change((now) => ({ ...now, target }));
@@ -94,6 +183,10 @@ export class FreeCamera {
 
   /** Return to the initial camera, which may look straight down, unlike an orbit. */
   restart(): void {
+    this.lastChange = -Infinity;
+    this.remember();
+    this.lastChange = -Infinity;
+    this.guard.cancel();
     this.motion.end();
     this.motion = this.createMotion(this.initialOrbit);
     this.hasMoved = false;
@@ -103,6 +196,7 @@ export class FreeCamera {
 
   /** Move to a playback pose. */
   play(playedPose: CameraPose): void {
+    this.guard.cancel();
     this.motion.end();
     this.motion = this.createMotion(orbitOf(playedPose, this.bounds));
     this.hasMoved = true;
@@ -129,17 +223,53 @@ export class FreeCamera {
   }
 
   end(): void {
+    this.guard.cancel();
     this.motion.end();
     setMoving(this.view.name, false);
+    isCameraMoving.value = false;
+  }
+
+  private moveTo(update: (orbit: Orbit) => Orbit): void {
+    this.hasMoved = true;
+    this.playbackPose = null;
+    this.wall = null;
+    this.motion.change(update);
+    this.save();
+  }
+
+  /** Store the pose before a gesture. */
+  private remember(): void {
+    const [now, before] = [performance.now(), this.lastChange];
+    this.lastChange = now;
+    if (now - before > GESTURE_MS) this.previous = [...this.previous, this.motion.target].slice(-MAX_PREVIOUS);
+  }
+
+  private onWall(wall: Wall): void {
+    this.wall = wall;
+    const run = () => void this.stepThrough().catch(showError);
+    showNote(`“${wall.material}” stops the camera.`, { label: "Step through", run });
+  }
+
+  /** Tell if the camera is inside a closed surface, where little can be visible. */
+  private async reportSolid(): Promise<void> {
+    const position = positionOf(this.motion.target);
+    const solid = await tracePath([position, position]).then(
+      (answer) => answer.solid,
+      () => null,
+    );
+    if (solid === null) return;
+    showNote(`The camera is inside “${solid}” and shows its inner side.`, { label: "Back", run: () => this.goBack() });
   }
 
   private createMotion(orbit: Orbit): CameraMotion {
     return new CameraMotion(orbit, (displayed, isLast) => this.report(poseOf(displayed), isLast));
   }
 
-  private report({ to_world, yfov }: CameraPose, isLast = true): void {
+  private report({ to_world, yfov, near = 0 }: CameraPose, isLast = true): void {
     const { name } = this.view;
-    const camera = { to_world, yfov: yfov / DEGREES };
+    const camera = { to_world, yfov: yfov / DEGREES, near };
+    isCameraMoving.value = !isLast;
+    if (isLast && !stopsAtWalls.peek()) void this.reportSolid();
     const [width, height] = this.size;
     // overlays such as light handles follow
     views.value = views
@@ -191,7 +321,7 @@ export class FreeCamera {
       const isSize =
         Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
       return {
-        orbit: orbit && isClose(orbit, orbit) ? orbit : null,
+        orbit: orbit && isClose(orbit, orbit) ? orbit : null, // not one of an older version, without some number
         size: isSize ? (size as StoredCamera["size"]) : null,
       };
     } catch {
@@ -223,14 +353,14 @@ export function freeCameraOf(name: string): FreeCamera | null {
 /** Current pose of a view; null with a fixed camera. */
 export function cameraOf(name: string): CameraPose | null {
   const view = views.peek().find((candidate) => candidate.name === name);
-  return view?.camera_mode === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
+  return view?.camera_mode === "free" ? toDegrees(view.camera) : null;
 }
 
 /** Move a view's camera, if it is free, and set its image size; null: the baked size, undefined: unchanged. */
 export function moveFreeCamera(name: string, camera: CameraPose, size?: ViewSize | null): void {
   const freeCamera = freeCameraOf(name);
   if (size !== undefined) freeCamera?.resize(size);
-  freeCamera?.change(() => orbitOf(camera, freeCamera.bounds));
+  freeCamera?.jump(() => orbitOf(camera, freeCamera.bounds));
 }
 
 /** Poses of free-camera views, by name, and their chosen image sizes. */
