@@ -37,6 +37,21 @@ export function defaultTerm(model: ModelBody): Term {
   };
 }
 
+/** "LV" of Ben-Artzi 2006, table 1: diffuse, times a drawn curve of the light angle and one of the view angle. Both start
+ * at one. */
+export const LIGHT_VIEW = { name: "light_view", label: "Light–view, LV (diffuse, drawn)" };
+
+export function lightViewTerm(models: readonly ModelBody[]): Term | null {
+  const lambert = models.find(({ model }) => model === "lambert");
+  const one = {
+    points: [
+      [0, 1],
+      [90, 1],
+    ],
+  };
+  return lambert === undefined ? null : { ...defaultTerm(lambert), curves: { theta_i: one, theta_o: one } };
+}
+
 /** The models that a term can have: measured models only if it refers to a measurement of their kind. */
 export function modelsFor(term: Term | null, models: readonly ModelBody[]): readonly ModelBody[] {
   return models.filter(({ data_prefix: prefix }) => prefix === null || term?.data?.startsWith(prefix) === true);
