@@ -73,7 +73,7 @@ export interface CameraMessage {
   refine?: "exact" | "none";
 }
 
-/** Interpolate cameras, spaced evenly over the frames; one frame each if no number of frames is given. */
+/** Interpolate cameras, spaced evenly over the frames, or as the looks if there are equally many; one frame each if no number of frames is given. */
 export interface CameraPath {
   cameras: CameraFrame[];
 }
@@ -151,7 +151,8 @@ export interface LooksRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
-  interpolation?: "parameters" | "map";
+  durations?: number[] | null;
+  interpolation?: "parameters" | "map" | "map_low";
   path?: Turntable | CameraPath | null;
   view?: string | null;
 }
@@ -206,7 +207,8 @@ export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
-  interpolation?: "parameters" | "map";
+  durations?: number[] | null;
+  interpolation?: "parameters" | "map" | "map_low";
   path?: Turntable | CameraPath | null;
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
