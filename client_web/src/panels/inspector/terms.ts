@@ -1,6 +1,6 @@
 /** Creates terms with a model's defaults, and changes a term's model, keeping shared settings. */
 import { isImageReference } from "../../state/document/imageReference";
-import type { ModelBody, Term } from "../../protocol";
+import type { DrawnCurve, ModelBody, Term } from "../../protocol";
 import { materialOf, modelOf } from "../../state/scene";
 
 /** Labels of a material's texture slots. */
@@ -43,7 +43,7 @@ export const LIGHT_VIEW = { name: "light_view", label: "Light–view, LV (diffus
 
 export function lightViewTerm(models: readonly ModelBody[]): Term | null {
   const lambert = models.find(({ model }) => model === "lambert");
-  const one = {
+  const one: DrawnCurve = {
     points: [
       [0, 1],
       [90, 1],

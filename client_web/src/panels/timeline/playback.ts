@@ -10,6 +10,7 @@ import { timelineOpen } from "../../state/panels";
 import { activeViewName } from "../../state/views";
 import { reportErrors } from "../../ui/toasts";
 import {
+  durations,
   interpolation,
   fewestKeyframes,
   keyframes,
@@ -127,6 +128,7 @@ effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
   const body = {
     frames: Math.max(numFrames.value, looks.length),
+    durations: durations.value,
     interpolation: interpolation.value,
     view: activeViewName.value,
   } satisfies Partial<LooksRequest>;
