@@ -670,7 +670,7 @@ export interface MeBody {
   allow_viewer_comments: boolean;
 }
 
-/** A measured material; looks refer to it by `data`, `terms` are its initial terms. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
+/** A measured material; looks refer to it by `data`, `terms` are its initial terms. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. `warnings`: what the conversion from another layout than MERL changed. */
 export interface MeasuredBody {
   id: string;
   data: string;
@@ -680,6 +680,7 @@ export interface MeasuredBody {
   thumbnail: string;
   lobes_error: [number, number, number];
   homomorphic_error: [number, number, number];
+  warnings: string[];
 }
 
 /** Terms that use the metallic map: textures of diffuse terms and highlights, and their mean f0. */
