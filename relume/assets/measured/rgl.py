@@ -34,7 +34,7 @@ _AXES = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "jacobian": 
 
 @dataclass(frozen=True)
 class RglBrdf:
-    """A BRDF by its arrays; leading axes are φi and θi, the last two azimuth and elevation of `u_m` or `u`.
+    """A BRDF by its arrays; leading axes are φi and θi, then come azimuth and elevation of `u_m` or `u`.
 
     Attributes:
         density, cumulative: `vndf` with a sum of 1, and its integral along the last axis.
@@ -47,7 +47,7 @@ class RglBrdf:
     sigma: Shaped[F64, "c d"]
     density: Shaped[F64, "p t h w"]
     cumulative: Shaped[F64, "p t h w"]
-    values: Shaped[F64, "p t 3 r r"]
+    values: Shaped[F64, "p t r r 3"]
     has_jacobian: bool
 
     @property
@@ -88,10 +88,12 @@ class RglBrdf:
             for t, weight_t in _neighbors(self.theta_i, theta_i)
         ]
         x, y = self._warp(slices, x, y)
+        (ix, fx), (iy, fy) = _cell(x, self.values.shape[3]), _cell(y, self.values.shape[2])
         total = np.zeros((len(x), 3))
-        for channel in range(3):
-            for (p, t), weight in slices:
-                total[:, channel] += weight * _bilinear_of(self.values[:, :, channel], (p, t), x, y)
+        for (p, t), weight in slices:
+            for row, weight_y in ((iy, 1 - fy), (iy + 1, fy)):
+                total += (weight * weight_y * (1 - fx))[:, None] * self.values[p, t, row, ix]
+                total += (weight * weight_y * fx)[:, None] * self.values[p, t, row, ix + 1]
         return total
 
     def _warp(self, slices: list[tuple[tuple[F64, F64], F64]], x: F64, y: F64) -> tuple[F64, F64]:
@@ -165,7 +167,8 @@ def _read_brdf(path: Path, label: str) -> RglBrdf:
     density, cumulative = _normalized(grids["vndf"])
     rgb = _to_rec709(label, tensors) if spectral else _floats(label, values, "rgb")
     has_jacobian = bool(np.asarray(tensors["jacobian"]).ravel()[0])
-    return RglBrdf(phi_i, theta_i, grids["ndf"], grids["sigma"], density, cumulative, rgb, has_jacobian)
+    channels_last = np.ascontiguousarray(np.moveaxis(rgb, 2, -1))
+    return RglBrdf(phi_i, theta_i, grids["ndf"], grids["sigma"], density, cumulative, channels_last, has_jacobian)
 
 
 def _num_parts(phi_i: F64) -> int:
@@ -236,12 +239,8 @@ def _cell(position: F64, num: int) -> tuple[NDArray[np.intp], F64]:
 
 
 def _bilinear(grid: Shaped[F64, "h w"], x: F64, y: F64) -> F64:
-    return _bilinear_of(grid, (), x, y)
-
-
-def _bilinear_of(grids: F64, index: tuple[F64, ...], x: F64, y: F64) -> F64:
-    """Value of a grid of a stack, at x along its last axis and y along the one before, both in [0, 1]."""
-    (ix, fx), (iy, fy) = _cell(x, grids.shape[-1]), _cell(y, grids.shape[-2])
-    low = (1 - fx) * grids[(*index, iy, ix)] + fx * grids[(*index, iy, ix + 1)]
-    high = (1 - fx) * grids[(*index, iy + 1, ix)] + fx * grids[(*index, iy + 1, ix + 1)]
+    """Value of a grid at x along its last axis and y along its first, both in [0, 1]."""
+    (ix, fx), (iy, fy) = _cell(x, grid.shape[1]), _cell(y, grid.shape[0])
+    low = (1 - fx) * grid[iy, ix] + fx * grid[iy, ix + 1]
+    high = (1 - fx) * grid[iy + 1, ix] + fx * grid[iy + 1, ix + 1]
     return np.asarray((1 - fy) * low + fy * high)

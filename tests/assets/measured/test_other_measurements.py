@@ -196,7 +196,7 @@ def test_polarized_and_huge_tensor_files_are_rejected(tmp_path, tensors):
         ("# only a comment\n", "wavelengths"),
         ("1e9 400\n", "wavelengths"),
         ("4.5 400\n", "wavelengths"),
-        ("nan 400\n", "wavelengths"),
+        ("# x\nnan 400\n", "wavelengths"),
         ("4\n400 500 600 700\n0.1 0 0.2 0 1 1 1 1\n", "whole rows"),
         (cornell_text(0.1)[:-12], "numbers more"),
         (cornell_text(0.1).replace("0.100000", "nan", 1), "non-finite"),
