@@ -11,12 +11,12 @@ import typer
 
 from relume_cli.options import BakeName, Data, DryRun, View
 from relume_cli.pictures.looks import Looks
-from relume_cli.pictures.plans import TurntableSubject
+from relume_cli.pictures.plans import Between, TurntableSubject
 from relume_cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
     from relume_cli.pictures.files import ExrOptions
-    from relume_cli.pictures.plans import PlannedFile, TurntablePlan
+    from relume_cli.pictures.plans import AnimationPlan, PlannedFile
     from relume_cli.pictures.write_images import RenderSource
     from relume_worker.service import BakeService
 
@@ -28,7 +28,7 @@ def render(
         typer.Option(
             metavar="FILE.exr|.png|.webp",
             help="Image file to write; {look} in it stands for the name of each look. "
-            "Turntable: a folder, or FILE.mp4.",
+            "Turntable or animation: a folder, or FILE.mp4.",
         ),
     ],
     look: Looks = None,
@@ -51,6 +51,17 @@ def render(
         TurntableSubject | None,
         typer.Option(help="Turntable: rotate the camera, the object, or the environment. [default: camera]"),
     ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Render N frames from look to look: PNG files in a folder, or a video."),
+    ] = None,
+    between: Annotated[
+        Between | None,
+        typer.Option(
+            help="Animation: interpolate materials straight by their parameters, or across the map of Ngan's or Löw's "
+            "fits. [default: straight]"
+        ),
+    ] = None,
     fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames per second. [default: 25]")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Skip files that exist.")] = False,
     approximate: Annotated[
@@ -60,32 +71,32 @@ def render(
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render exact images of looks, or turntables.
+    """Render exact images of looks, turntables, or animations from look to look.
 
     Prints the names of the written files.
     """
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.pictures.files import exr_options
     from relume_cli.pictures.looks import read_looks
-    from relume_cli.pictures.plans import check_target, make_turntable_plan, plan_files
+    from relume_cli.pictures.plans import check_target, make_animation_plan, plan_files
     from relume_server.persistence.look_store import LookStore
 
-    turntable_plan = make_turntable_plan(turntable, rotate, fps)
-    check_target(output, turntable_plan, resumes=resume)
+    animation_plan = make_animation_plan(turntable, rotate, frames, between, fps)
+    check_target(output, animation_plan, resumes=resume)
     exr = exr_options(output, layers=layers, light_groups=light_groups, full_float=full_float, color_space=color_space)
     service = open_bakes(open_settings(data))
     try:
-        planned_files = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, turntable_plan)
+        planned_files = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, animation_plan)
         source = _open(
             service,
             bake,
             view,
-            is_free_camera=turntable_plan is not None and turntable_plan.subject != "environment",
+            is_free_camera=animation_plan is not None and animation_plan.subject in ("camera", "object"),
             approximate=approximate,
         )
-        documents = _check(source, planned_files, turntable_plan)
+        documents = _check(source, planned_files, animation_plan)
         if not dry_run:
-            _write(source, planned_files, turntable_plan, exr, resumes=resume)
+            _write(source, planned_files, animation_plan, exr, resumes=resume)
     finally:
         service.close()
     for planned_file, document in zip(planned_files, documents, strict=True):
@@ -93,23 +104,24 @@ def render(
 
 
 def _check(
-    source: RenderSource, planned_files: Sequence[PlannedFile], turntable_plan: TurntablePlan | None
+    source: RenderSource, planned_files: Sequence[PlannedFile], animation_plan: AnimationPlan | None
 ) -> list[dict[str, Any]]:
-    """Return the files to write, as JSON. Raises ParameterError if a look or the turntable is invalid."""
+    """Return the files to write, as JSON. Raises ParameterError if a look or the animation is invalid."""
     from relume_cli.pictures.plans import complete_plan
-    from relume_cli.pictures.write_images import check_turntable
+    from relume_cli.pictures.write_images import check_animation_plan
     from relume_server.batch.frame_sequence import crossed_material
 
     view = source.transfer.views[source.view]
-    looks = [complete_plan(planned_file, source.transfer.default_look) for planned_file in planned_files]
+    default = source.transfer.default_look
+    looks = [look for planned_file in planned_files for look in complete_plan(planned_file, default)]
     if any(look.environment.map is not None for look in looks):
         note("note: this environment was not baked, so shadows of small light sources are approximate")
-    if turntable_plan is not None:
-        animation, _ = check_turntable(source, planned_files[0], turntable_plan)
+    if animation_plan is not None:
+        animation, _ = check_animation_plan(source, planned_files[0], animation_plan)
         if (material := crossed_material(animation, source.view, source.transfer)) is not None:
             note(f"note: the turntable passes through {material!r}; frames behind it show it from outside")
     common = {"scene": source.scene.id, "bake": source.bake.id, "view": source.view, "size": [view.width, view.height]}
-    frames = 1 if turntable_plan is None else turntable_plan.frames
+    frames = 1 if animation_plan is None else animation_plan.frames
     return [
         {"path": str(planned_file.path), "look": planned_file.look, **common, "frames": frames}
         for planned_file in planned_files
@@ -119,24 +131,24 @@ def _check(
 def _write(
     source: RenderSource,
     planned_files: Sequence[PlannedFile],
-    turntable_plan: TurntablePlan | None,
+    animation_plan: AnimationPlan | None,
     exr: ExrOptions,
     *,
     resumes: bool,
 ) -> None:
     """Render all planned files, with progress."""
     from relume_cli.pictures.plans import complete_plan
-    from relume_cli.pictures.write_images import write_picture, write_turntable
+    from relume_cli.pictures.write_images import write_animation, write_picture
     from relume_cli.terminal.progress import progress, report_part
 
     with progress("render") as report:
-        if turntable_plan is not None:
-            write_turntable(source, planned_files[0], turntable_plan, report)
+        if animation_plan is not None:
+            write_animation(source, planned_files[0], animation_plan, report)
             return
         for number, planned_file in enumerate(planned_files):
             detail = f"{planned_file.look}, {number + 1} of {len(planned_files)}" if len(planned_files) > 1 else ""
             if not (resumes and planned_file.path.exists()):
-                look = complete_plan(planned_file, source.transfer.default_look)
+                (look,) = complete_plan(planned_file, source.transfer.default_look)
                 write_picture(
                     source, look, planned_file.path, exr, report_part(report, number, len(planned_files), detail)
                 )

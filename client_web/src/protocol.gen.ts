@@ -76,7 +76,7 @@ export interface CameraMessage {
   refine?: "exact" | "none";
 }
 
-/** Interpolate cameras, spaced evenly over the frames; one frame each if no number of frames is given. */
+/** Interpolate cameras, spaced evenly over the frames, or as the looks if there are equally many; one frame each if no number of frames is given. */
 export interface CameraPath {
   cameras: CameraFrame[];
 }
@@ -154,7 +154,8 @@ export interface LooksRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
-  interpolation?: "parameters" | "map";
+  durations?: number[] | null;
+  interpolation?: "parameters" | "map" | "map_low";
   path?: Turntable | CameraPath | null;
   view?: string | null;
 }
@@ -216,7 +217,8 @@ export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
-  interpolation?: "parameters" | "map";
+  durations?: number[] | null;
+  interpolation?: "parameters" | "map" | "map_low";
   path?: Turntable | CameraPath | null;
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
@@ -683,7 +685,7 @@ export interface MeBody {
   allow_viewer_comments: boolean;
 }
 
-/** A measured material; looks refer to it by `data`, `terms` are its initial terms. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
+/** A measured material; looks refer to it by `data`, `terms` are its initial terms. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. `warnings`: what the conversion from another layout than MERL changed. */
 export interface MeasuredBody {
   id: string;
   data: string;
@@ -693,6 +695,7 @@ export interface MeasuredBody {
   thumbnail: string;
   lobes_error: [number, number, number];
   homomorphic_error: [number, number, number];
+  warnings: string[];
 }
 
 /** Terms that use the metallic map: textures of diffuse terms and highlights, and their mean f0. */

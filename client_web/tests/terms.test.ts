@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { albedoMessage } from "../src/panels/inspector/albedo";
 import { btfOf, limitToStored, isWithinStored } from "../src/panels/inspector/measuredInfo";
-import { isMirror, texturesOf } from "../src/panels/inspector/terms";
+import { isMirror, lightViewTerm, texturesOf } from "../src/panels/inspector/terms";
 import type { ModelBody, ParameterBody, Rgb, SceneBody, Term } from "../src/protocol";
 import { models, scene } from "../src/state/scene";
 
@@ -20,6 +20,18 @@ test("a material offers the images that its own terms take, in their order", () 
   expect(texturesOf("Tray")).toEqual(["diffuse", "specular"]);
   expect(texturesOf("Wall")).toEqual([]);
   expect(texturesOf("Nothing")).toEqual([]);
+});
+
+test("LV is diffuse with a curve of each direction, both one", () => {
+  expect(lightViewTerm([])).toBeNull();
+  const lambert = { model: "lambert", texture: "diffuse", parameters: [] } as unknown as ModelBody;
+  const one = {
+    points: [
+      [0, 1],
+      [90, 1],
+    ],
+  };
+  expect(lightViewTerm([lambert])).toMatchObject({ model: "lambert", curves: { theta_i: one, theta_o: one } });
 });
 
 test("a smooth, untextured term is a mirror if its facets are not drawn", () => {

@@ -2,7 +2,8 @@
 
 Numbers are interpolated linearly; parameters with a logarithmic slider are interpolated in the logarithm. Values that
 cannot be interpolated, such as a model, a map, or a light in only one of the looks, switch half way. In mode "map",
-Cook–Torrance materials follow a path across the navigation map (Sun 2007, 4.2).
+Cook–Torrance materials follow a path across the navigation map of Ngan's fits (Sun 2007, 4.2), in mode "map_low" across
+that of Löw's.
 """
 
 from __future__ import annotations
@@ -11,21 +12,29 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
+import numpy as np
+
 from relume.brdf.registry import TERMS
 from relume.look.light_validation import MIN_DIRECTION
 
-InterpolationMode = Literal["parameters", "map"]
+InterpolationMode = Literal["parameters", "map", "map_low"]
 
 
-def enclosing_keyframes(num_looks: int, fraction: float) -> tuple[int, int, float]:
-    """Find the two keyframes that enclose a time of an animation; keyframes are equally spaced.
+def enclosing_keyframes(
+    num_looks: int, fraction: float, durations: Sequence[float] | None = None
+) -> tuple[int, int, float]:
+    """Find the two keyframes that enclose a time of an animation.
 
     Args:
         num_looks: at least one. fraction: 0 at the first keyframe, 1 at the last.
+        durations: time between keyframes, one less than these, positive, in any unit; None for equal ones.
     Returns:
         Indices of both keyframes, equal if the time is exactly at one, and the weight of the second.
     """
     position = fraction * (num_looks - 1)
+    if durations is not None:
+        times = np.concatenate([[0.0], np.cumsum(durations)])
+        position = float(np.interp(fraction * times[-1], times, np.arange(num_looks)))
     first = min(int(position), num_looks - 1)
     weight = position - first
     return (first, first, 0.0) if weight == 0 else (first, first + 1, weight)
@@ -45,13 +54,15 @@ def interpolate_looks(
         return looks[first]
     start, end = looks[first], looks[second]
     interpolated: Mapping[str, Any] = _interpolate(start, end, weight)
-    if mode == "map":
+    if mode != "parameters":
         from relume.look.library.navigation_path import path_on_map  # imports SciPy, slow and rarely needed
 
         for name, material in interpolated["materials"].items():
             ends = [look["materials"].get(name) for look in (start, end)]
             if None not in ends and ends[0] != ends[1]:
-                terms = path_on_map(ends[0]["terms"], ends[1]["terms"], material["terms"], weight)
+                terms = path_on_map(
+                    ends[0]["terms"], ends[1]["terms"], material["terms"], weight, "ngan" if mode == "map" else "low"
+                )
                 interpolated["materials"][name] = {**material, "terms": terms}
     return interpolated
 

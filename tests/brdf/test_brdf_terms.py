@@ -225,6 +225,22 @@ def test_steep_slopes_are_normalized(model, name):
     assert projected == pytest.approx(area, rel=1e-8)
 
 
+@pytest.mark.parametrize("widths", [(2.0, 2.0), (2.0, 0.02), (0.3, 2.0)])
+def test_steep_anisotropic_slopes_are_normalized(widths):
+    """∫ D(x, y) dx dy over slopes is 1/4 as for the isotropic term, and no more light is reflected than arrives."""
+    term = TERMS["ward_anisotropic"]
+    assert {p.maximum for p in term.parameters} == {2.0}
+    areas = []
+    for curve, parameter, width in zip(term.curves, term.parameters, widths, strict=False):
+        gamma = np.arctan(width * np.linspace(-12, 12, 20_001))  # slopes tan γ in units of the width
+        values = curve.generator(np.abs(gamma), {parameter.name: width})
+        areas.append(np.trapezoid(values, np.tan(gamma)))
+    assert np.prod(areas) == pytest.approx(0.25, rel=1e-8)
+    document = {"model": "ward_anisotropic", "params": {"alpha_x": widths[0], "alpha_y": widths[1]}}
+    for theta_o in np.radians([0.0, 45.0, 80.0]):
+        assert directional_albedo(document, theta_o) <= 1.01
+
+
 @pytest.mark.parametrize("sigma", [0.01, 0.05, 0.2, 1.0, 2.0])
 def test_cook_torrance_peak_is_f0_over_four_pi_sigma_squared(sigma):
     n = np.array([0.0, 0.0, 1.0])

@@ -239,7 +239,14 @@ def test_dry_run_of_a_render_validates_and_writes_nothing(run: Any, tmp_path: Pa
         (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "look with --turntable"),
         (["--look", "Green", "--output", "x.png"], "folder or saved look; choose from 'Blue', 'Red night'"),
         (["--look", "/no/look.json", "--output", "x.png"], "--look is '/no/look.json'; give a file that exists"),
-        (["--output", "x.mp4"], "or --turntable N for a video"),
+        (["--output", "x.mp4"], "or --turntable N or --frames N for a video"),
+        (["--frames", "9", "--output", "way"], "one look; give two or more looks with --frames"),
+        (["--look", "Blue", "--look", "Red night", "--frames", "1", "--output", "way"], "2 to 3,600 frames"),
+        (["--look", "Blue", "--look", "Red night", "--frames", "10000000", "--output", "way"], "2 to 3,600 frames"),
+        (["--look", "Blue", "--look", "Red night", "--look", "Blue", "--frames", "2", "--output", "way"], "per frame"),
+        (["--look", "Blue", "--look", "Red night", "--frames", "4", "--output", "way.png"], "numbered frames"),
+        (["--frames", "9", "--turntable", "9", "--output", "way"], "--frames is 9; give it without --turntable"),
+        (["--between", "map", "--output", "x.png"], "--between is 'map'; give it with --frames N"),
         (["--rotate", "object", "--output", "x.png"], "--rotate is 'object'; give it with --turntable N"),
         (["--fps", "10", "--output", "x.png"], "--fps is 10; give it with --turntable N"),
         (["--turntable", "2", "--output", "x.png"], "a folder for the numbered frames, or a name ending in .mp4"),
@@ -267,6 +274,30 @@ def test_turntable_video_is_written_and_its_path_printed(run: Any, tmp_path: Pat
     code, text, _ = run("render", "quad one", *words[:4], "--output", str(tmp_path / "round"))
     assert (code, text) == (0, f"{tmp_path / 'round'}\n")
     assert sorted(path.name for path in (tmp_path / "round").iterdir()) == ["0000.png", "0001.png", "0002.png"]
+
+
+def test_animation_of_looks_is_numbered_resumed_and_ends_at_both(run: Any, tmp_path: Path) -> None:
+    words = ["render", "quad one", "--look", "Blue", "--look", "Red night", "--frames", "3", "--between", "map"]
+    folder = tmp_path / "way"
+    code, text, said = run(*words, "--output", str(folder), "--json")
+    assert code == 0, said
+    (document,) = parsed(text)
+    assert (document["path"], document["look"], document["frames"]) == (str(folder), "Blue to Red night", 3)
+    assert sorted(path.name for path in folder.iterdir()) == ["0000.png", "0001.png", "0002.png"]
+    for name, frame in (("Blue", 0), ("Red night", 2)):
+        assert run("render", "quad one", "--look", name, "--output", str(tmp_path / "end.png"))[0] == 0
+        assert (tmp_path / "end.png").read_bytes() == (folder / f"000{frame}.png").read_bytes()
+    first, between, last = (mean_of(folder / f"000{k}.png") for k in range(3))
+    assert min(first[2], last[2]) < between[2] < max(first[2], last[2])
+    assert run(*words, "--output", str(folder))[0] == 1  # there are frames already
+    whole = (folder / "0002.png").read_bytes()
+    (folder / "0001.png").write_bytes(b"kept")
+    (folder / "0002.png").unlink()
+    assert run(*words, "--output", str(folder), "--resume")[0] == 0
+    assert (folder / "0001.png").read_bytes() == b"kept"
+    assert (folder / "0002.png").read_bytes() == whole
+    assert run(*words, "--output", str(tmp_path / "way.mp4"))[0] == 0
+    assert (tmp_path / "way.mp4").read_bytes()[4:8] == b"ftyp"
 
 
 def test_quiet_still_prints_results(run: Any, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from relume.look import complete, default_look
-from relume.look.interpolate import interpolate_looks
+from relume.look.interpolate import enclosing_keyframes, interpolate_looks
 from relume.look.library.navigation_map import navigation_map
 from relume.scene.model import Material
 
@@ -99,6 +99,13 @@ def test_drawn_curves_of_equal_length_are_interpolated_by_points():
     assert curve == [[0.0, 2.0], [40.0, 0.0]]
 
 
+def test_durations_are_the_times_between_keyframes():
+    assert enclosing_keyframes(3, 0.5) == (1, 1, 0.0)
+    for fraction, expected in ((0.0, (0, 0, 0.0)), (0.1, (0, 1, 0.4)), (0.25, (1, 1, 0.0)), (0.625, (1, 2, 0.5))):
+        assert enclosing_keyframes(3, fraction, [2.0, 6.0]) == pytest.approx(expected)
+    assert enclosing_keyframes(3, 1.0, [2.0, 6.0])[0] == 2
+
+
 def of_map(color, f0, sigma):
     """Terms of a material of the map."""
     root = math.sqrt(f0)
@@ -122,13 +129,31 @@ def test_a_path_across_the_map_passes_through_its_materials():
     params = ball(between)[1]["params"]
     assert params["sigma"] == pytest.approx(0.15)
     assert ((params["ior"] - 1) / (params["ior"] + 1)) ** 2 == pytest.approx(0.26)
-    passed = navigation_map().at(0.26, 0.15)
+    passed = navigation_map("ngan").at(0.26, 0.15)
     beside = [
-        np.array([t["color"] for t in ball(end)]) - np.array([t["color"] for t in navigation_map().at(*point)])
+        np.array([t["color"] for t in ball(end)]) - np.array([t["color"] for t in navigation_map("ngan").at(*point)])
         for end, point in zip(ends, ((0.02, 0.05), (0.5, 0.45)), strict=True)
     ]
     expected = np.array([t["color"] for t in passed]) + np.mean(beside, axis=0)
     np.testing.assert_allclose([t["color"] for t in ball(between)], np.maximum(expected, 0), atol=1e-6)
+
+
+@pytest.mark.parametrize(("mode", "table"), [("map", "ngan"), ("map_low", "low")])
+def test_a_path_between_two_fits_is_the_line_of_their_map(mode, table):
+    """Metals have extinction on Ngan's map and none on Löw's; both lines are linear in reflectance."""
+    plane = navigation_map(table)
+    first, second = (next(p for p in plane.presets if p.id.endswith(name)) for name in ("/chrome", "/blue-acrylic"))
+    ends = [look(materials={"Ball": {"terms": copy.deepcopy(preset.terms)}}) for preset in (first, second)]
+    f0, sigma = (
+        [values[plane.presets.index(preset)] for preset in (first, second)] for values in (plane.f0, plane.sigma)
+    )
+    for weight in (0.25, 0.6):
+        position = (1 - weight) * f0[0] + weight * f0[1], sigma[0] ** (1 - weight) * sigma[1] ** weight
+        between, expected = ball(interpolate_looks(ends, weight, mode)), plane.at(*position)
+        for actual, term in zip(between, expected, strict=True):
+            np.testing.assert_allclose(actual["color"], term["color"], atol=1e-9)
+            assert actual["params"] == pytest.approx(term["params"], rel=1e-9, abs=1e-9)
+        assert (between[1]["params"]["extinction"] > 0) == (table == "ngan")
 
 
 def test_other_materials_are_interpolated_by_parameters():

@@ -141,6 +141,9 @@ def test_camera_path_interpolates_cameras_and_looks(
         {"path": {"cameras": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
         {"frames": 0},
         {"frames": 1, "looks": [{}, {}]},
+        {"frames": 4, "looks": [{}, {}], "durations": []},
+        {"frames": 4, "looks": [{}, {}], "durations": [0.0]},
+        {"frames": 4, "looks": [{}, {}], "durations": [1.0, 1.0]},
         {"fps": 0},
         {"size": [16000, 16000]},
     ],
@@ -240,6 +243,9 @@ def test_listed_looks_are_those_that_are_rendered(
     looks = answer.json()["looks"]
     colors = [look["materials"][material]["terms"][0]["color"] for look in looks]
     np.testing.assert_allclose(colors, [[0.8 - 0.2 * k, 0, 0.2 * k] for k in range(5)], atol=1e-9)
+    timed = client.post("/api/renders/looks", json={**keys, "looks": [*keys["looks"], {}], "durations": [3.0, 1.0]})
+    timed_colors = [look["materials"][material]["terms"][0]["color"] for look in timed.json()["looks"]]
+    np.testing.assert_allclose(timed_colors[:4], [[0.8 - 0.8 * k / 3, 0, 0.8 * k / 3] for k in range(4)], atol=1e-9)
     small = {"view": view["name"], "size": [20, 15], "quality": "interactive"}
     listed = frames_of(client, {"bake": bake, "looks": looks, **small}, tmp_path)
     rendered = frames_of(client, {**keys, **small}, tmp_path)

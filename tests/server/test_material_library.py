@@ -32,14 +32,15 @@ def test_stored_thumbnails_equal_new_renders() -> None:
         assert difference.mean() < 2, preset.id  # the error of lossy encoding, in units of 1/255
 
 
-def test_map_point_between_materials_is_a_material(client: TestClient) -> None:
-    points = client.get("/api/materials/map").json()["points"]
+@pytest.mark.parametrize("table", ["ngan", "low"])
+def test_map_point_between_materials_is_a_material(client: TestClient, table: str) -> None:
+    points = client.get("/api/materials/map", params={"table": table}).json()["points"]
     f0, sigma = (float(np.median([point[axis] for point in points])) for axis in ("f0", "sigma"))
-    terms = client.get("/api/materials/map/at", params={"f0": f0, "sigma": sigma}).json()
+    terms = client.get("/api/materials/map/at", params={"f0": f0, "sigma": sigma, "table": table}).json()
     assert [term["model"] for term in terms] == ["lambert", "cook_torrance"]
     assert terms[1]["params"]["sigma"] == pytest.approx(sigma, rel=1e-6)
-    ior = terms[1]["params"]["ior"]
-    assert ((ior - 1) / (ior + 1)) ** 2 == pytest.approx(f0, rel=1e-6)
+    index = terms[1]["params"]["ior"] + 1j * terms[1]["params"]["extinction"]
+    assert abs((index - 1) / (index + 1)) ** 2 == pytest.approx(f0, rel=1e-6)
 
 
 @pytest.mark.parametrize(("f0", "sigma"), [("nan", "0.1"), ("2", "0.1"), ("0.1", "0"), ("0.1", "inf"), ("x", "0.1")])

@@ -241,12 +241,17 @@ def test_library_materials_are_listed_and_usable_in_looks(client: TestClient, ba
 
 def test_material_map_has_points_of_the_library(client: TestClient) -> None:
     listed = {entry["id"]: entry for entry in client.get("/api/materials").json()}
-    plane = client.get("/api/materials/map").json()
-    for point in plane["points"]:
-        params = listed[point["id"]]["terms"][1]["params"]
-        assert point["sigma"] == params["sigma"]
-        assert point["f0"] == pytest.approx(((params["ior"] - 1) / (params["ior"] + 1)) ** 2)
-    assert {k for triangle in plane["triangles"] for k in triangle} == set(range(len(plane["points"])))
+    assert client.get("/api/materials/map").json() == client.get("/api/materials/map?table=ngan").json()
+    assert client.get("/api/materials/map?table=bagher").status_code == 422
+    for table in ("ngan", "low"):
+        plane = client.get(f"/api/materials/map?table={table}").json()
+        for point in plane["points"]:
+            assert point["id"].startswith(table)
+            params = listed[point["id"]]["terms"][1]["params"]
+            assert point["sigma"] == params["sigma"]
+            index = params["ior"] + 1j * params["extinction"]
+            assert point["f0"] == pytest.approx(abs((index - 1) / (index + 1)) ** 2)
+        assert {k for triangle in plane["triangles"] for k in triangle} == set(range(len(plane["points"])))
 
 
 def test_render_batch_produces_frames_and_archive(client: TestClient, baked: Baked) -> None:

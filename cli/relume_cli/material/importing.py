@@ -17,8 +17,8 @@ def material_import(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE.binary|FILE.zip|FILE.btf",
-            help="Isotropic MERL BRDF, UBO2003 BTF images in a ZIP, or UBO2014 BTF.",
+            metavar="FILE.binary|.bsdf|.brdf|.zip|.btf",
+            help="BRDF (MERL, RGL, or Cornell's scattered values), UBO2003 BTF images in a ZIP, or UBO2014 BTF.",
         ),
     ],
     name: Annotated[str | None, typer.Option(help="Name of the material. [default: file name]")] = None,
@@ -48,6 +48,7 @@ def material_import(
         f"blue)"
         for model, errors in model_errors
     ]
+    lines += [f"  warning: {warning}" for warning in record.warnings]
     print_material(record, lines, as_json=as_json)
 
 

@@ -1,4 +1,4 @@
-"""Render images and turntables of a bake."""
+"""Render images and animations of a bake."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from relume.look import Look
     from relume.scene.model import Camera
     from relume_cli.pictures.files import ExrOptions
-    from relume_cli.pictures.plans import PlannedFile, TurntablePlan
+    from relume_cli.pictures.plans import AnimationPlan, PlannedFile
     from relume_server.schemas.renders import Animation
     from relume_worker.scenes import SceneRecord
     from relume_worker.status import BakeStatus
@@ -93,20 +93,21 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
     )
 
 
-def write_turntable(
-    source: RenderSource, planned_file: PlannedFile, turntable_plan: TurntablePlan, report: ReportProgress
+def write_animation(
+    source: RenderSource, planned_file: PlannedFile, animation_plan: AnimationPlan, report: ReportProgress
 ) -> None:
     """Write the missing frames 0000.png, 0001.png, … into a folder, or a video of them.
 
     Args:
         source: an opened bake; a free-camera one if the camera or the object rotates. planned_file: a look and its
-            path. turntable_plan: frames and subject. report: called with the fraction done, within frames as well.
+            path, or keyframes. animation_plan: frames and subject.
+        report: called with the fraction done, within frames as well.
     """
     from relume.output.render_image import render_image
     from relume_server.batch.frame_sequence import look_at_frame
     from relume_server.io.video import write_video
 
-    animation, cameras = check_turntable(source, planned_file, turntable_plan)
+    animation, cameras = check_animation_plan(source, planned_file, animation_plan)
     folder, view = frames_folder(planned_file.path), source.transfer.views[source.view]
     folder.mkdir(exist_ok=True)
 
@@ -126,28 +127,34 @@ def write_turntable(
         file, frame_look = folder / f"{index:04d}.png", look_at_frame(animation, source.view, source.transfer, index)
         if not file.exists():
             report_frame = report_part(
-                report, index, turntable_plan.frames, f"frame {index + 1} of {turntable_plan.frames}"
+                report, index, animation_plan.frames, f"frame {index + 1} of {animation_plan.frames}"
             )
             save(file, frame(camera, frame_look, report_frame), frame_look)
     if planned_file.path.suffix.lower() == VIDEO:
         report(1.0, "encoding the video")
-        write_video(folder, turntable_plan.fps, planned_file.path, lambda: False)
+        write_video(folder, animation_plan.fps, planned_file.path, lambda: False)
         shutil.rmtree(folder)
 
 
-def check_turntable(
-    source: RenderSource, planned_file: PlannedFile, turntable_plan: TurntablePlan
+def check_animation_plan(
+    source: RenderSource, planned_file: PlannedFile, animation_plan: AnimationPlan
 ) -> tuple[Animation, Sequence[Camera | None]]:
     """Return the animation, and the camera of each frame (None: the baked one).
 
     Args:
-        source: an opened bake. planned_file: a look and its path. turntable_plan: frames and subject.
+        source: an opened bake. planned_file: a look or keyframes, and the path. animation_plan: frames and subject.
     Raises:
         ParameterError: the bake does not support it.
     """
     from relume_server.batch.frame_sequence import check_animation
     from relume_server.schemas.renders import Animation, Turntable
 
-    path = Turntable(turntable=turntable_plan.frames, rotate=turntable_plan.subject)
-    animation = Animation(bake=source.bake.id, looks=[planned_file.document], path=path)
+    frames, subject = animation_plan.frames, animation_plan.subject
+    animation = Animation(
+        bake=source.bake.id,
+        looks=list(planned_file.documents),
+        frames=frames,
+        interpolation=animation_plan.interpolation,
+        path=None if subject is None else Turntable(turntable=frames, rotate=subject),
+    )
     return animation, check_animation(animation, source.view, source.transfer)

@@ -17,8 +17,10 @@ export interface NamedLook {
   created?: string | undefined;
 }
 
-/** A keyframe of the timeline; `camera`: its pose on a camera path through the keyframes. Angles in degrees. */
+/** A keyframe of the timeline; `camera`: its pose on a camera path through the keyframes, angles in degrees; `duration`:
+ * relative time to the next keyframe, by default 1. */
 export interface Keyframe extends NamedLook {
+  duration?: number | undefined;
   camera?: { to_world: number[]; yfov: number; near?: number } | null;
 }
 

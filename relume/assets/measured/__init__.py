@@ -1,4 +1,4 @@
-"""Measured isotropic BRDFs (MERL) and their factorizations into curves.
+"""Measured isotropic BRDFs (MERL, RGL, Cornell) and their factorizations into curves.
 
-Read first: `measured_store`, `factorize`.
+Read first: `measured_store`, `read_measured`, `factorize`.
 """

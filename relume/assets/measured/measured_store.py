@@ -1,8 +1,8 @@
 """Store of imported measured materials, in `relume.assets.asset_store`.
 
-    <folder>/<id>/measured.binary    the imported file
+    <folder>/<id>/measured.binary    the imported file; of another layout than MERL, its conversion
                   table.npy          its table for `relume.assets.measured.interpolate`
-                  material.json      name, curves and their errors without the quotient
+                  material.json      name, warnings, curves and their errors without the quotient
 
 Looks refer to one as "merl:<id>".
 """
@@ -20,7 +20,8 @@ from jaxtyping import Shaped
 from relume.assets.asset_store import AssetStore
 from relume.assets.measured.factorize import factorize
 from relume.assets.measured.interpolate import F32, NUM_KNOTS, build_table
-from relume.assets.measured.merl import F64, SHAPE, read_merl
+from relume.assets.measured.merl import F64, SHAPE, write_merl
+from relume.assets.measured.read_measured import read_measured
 from relume.core.cache import asset_cached
 from relume.core.errors import MaterialError
 
@@ -37,6 +38,7 @@ class MaterialRecord:
         created: seconds since 1970.
         lobes_error, homomorphic_error: errors of the curves without the quotient, see
             `relume.assets.measured.factorize.MeasuredFactors`.
+        warnings: what the conversion from another layout changed.
     """
 
     id: str
@@ -44,6 +46,7 @@ class MaterialRecord:
     created: float
     lobes_error: Rgb
     homomorphic_error: Rgb
+    warnings: tuple[str, ...] = ()
 
     @property
     def data(self) -> str:
@@ -65,7 +68,7 @@ class MeasuredBrdf:
 
 
 def store_material(folder: Path, source: Path, name: str, file_name: str | None = None) -> MaterialRecord:
-    """Import a MERL file; takes some seconds and 0.5 GB. An existing one with this content gets the new name.
+    """Import a file of any layout; takes some seconds and 0.5 GB. An existing one with this content gets the new name.
 
     Args:
         folder: folder of the asset store.
@@ -75,13 +78,17 @@ def store_material(folder: Path, source: Path, name: str, file_name: str | None 
     Raises:
         MaterialError: the file is unusable, or the store is full.
     """
-    planes = read_merl(source, file_name)
+    measurement, is_merl = read_measured(source, file_name)
 
     def fill(staged_folder: Path) -> dict[str, Any]:
-        table = build_table(planes)
-        shutil.copyfile(source, staged_folder / _SOURCE)
+        table = build_table(measurement.planes)
+        if is_merl:
+            shutil.copyfile(source, staged_folder / _SOURCE)
+        else:
+            write_merl(staged_folder / _SOURCE, measurement.planes)
         np.save(staged_folder / _TABLE, table)
-        return {key: np.asarray(value).tolist() for key, value in asdict(factorize(planes, table)).items()}
+        factors = asdict(factorize(measurement.planes, table))
+        return {key: np.asarray(value).tolist() for key, value in factors.items()} | {"warnings": measurement.warnings}
 
     return get_record(folder, STORE.store(folder, source, name, fill))
 
@@ -99,11 +106,14 @@ def get_record(folder: Path, identity: str) -> MaterialRecord:
         errors = [_rgb(document[key]) for key in ("lobes_error", "homomorphic_error")]
     except (KeyError, TypeError, ValueError) as error:
         raise STORE.damaged_error(path) from error
-    return MaterialRecord(identity, document["name"], document["created"], *errors)
+    warnings = document.get("warnings", [])
+    if not (isinstance(warnings, list) and all(isinstance(warning, str) for warning in warnings)):
+        raise STORE.damaged_error(path)
+    return MaterialRecord(identity, document["name"], document["created"], *errors, tuple(warnings))
 
 
 def source_path(data: str) -> Path:
-    """Return the path of the imported file. Raises NotFoundError."""
+    """Return the path of the measurement in the MERL layout. Raises NotFoundError."""
     return STORE.resolve(data) / _SOURCE
 
 

@@ -45,7 +45,9 @@ def read_merl(path: Path, file_name: str | None = None) -> Shaped[F64, "3 90 90 
         header = file.read(_HEADER.size)
         size = path.stat().st_size
         if len(header) < _HEADER.size or _HEADER.unpack(header) != SHAPE:
-            raise MaterialError(f"{label} is not a MERL file: it does not start with 90, 90, 180; give a .binary")
+            raise MaterialError(
+                f"{label} is not a MERL file: it does not start with 90, 90, 180; give a .binary, .bsdf or .brdf"
+            )
         if size != FILE_BYTES:
             raise MaterialError(f"{label} has {size:,} bytes, a MERL file {FILE_BYTES:,}; download it again")
         planes = np.fromfile(file, "<f8").reshape(3, *SHAPE).astype(np.float64, copy=False)

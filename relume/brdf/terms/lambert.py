@@ -1,4 +1,7 @@
-"""lambert: the ideal diffuse term. Quotient 1/π; one curve over θi, which is one until it is drawn."""
+"""lambert: the ideal diffuse term. Quotient 1/π; one curve over θi, which is one until it is drawn.
+
+Drawn over θi and θo it is LV, the analytic light–view model of Ben-Artzi 2006, table 1.
+"""
 
 from __future__ import annotations
 
@@ -37,5 +40,5 @@ LAMBERT = Term(
     source="Lambert 1760: f = 1/π",
     texture="diffuse",
     is_lambertian=True,
-    help="Light scattered uniformly in all directions; the color is the albedo.",
+    help="Light scattered uniformly in all directions; the color is the albedo. Drawn over θi and θo: LV.",
 )

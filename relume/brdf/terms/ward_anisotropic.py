@@ -28,8 +28,8 @@ WARD_ANISOTROPIC = Term(
     model="ward_anisotropic",
     label="Ward, anisotropic",
     parameters=(
-        Parameter("alpha_x", "Width αx", 0.005, 1.0, 0.1, "", "log", "Slopes along the tangent."),
-        Parameter("alpha_y", "Width αy", 0.005, 1.0, 0.3, "", "log", "Slopes across the tangent."),
+        Parameter("alpha_x", "Width αx", 0.005, 2.0, 0.1, "", "log", "Slopes along the tangent."),
+        Parameter("alpha_y", "Width αy", 0.005, 2.0, 0.3, "", "log", "Slopes across the tangent."),
     ),
     curves=(
         Curve("tilt_x", "tilt along the tangent γx", Angle.TILT_X, lobe_x, ("alpha_x",), 256),

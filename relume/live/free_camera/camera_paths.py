@@ -60,18 +60,24 @@ def turntable(camera: Camera, pivot: Shaped[F64, " 3"], num_cameras: int) -> lis
     return cameras
 
 
-def interpolate_cameras(cameras: Sequence[Camera], num_cameras: int) -> list[Camera]:
+def interpolate_cameras(
+    cameras: Sequence[Camera], num_cameras: int, durations: Sequence[float] | None = None
+) -> list[Camera]:
     """Interpolate from the first camera to the last through all others, at equal time steps.
 
     Positions follow monotone cubics (PCHIP), orientations a rotation spline, and fields of view cubics of their
     logarithm; near planes follow cubics.
 
     Args:
-        cameras: at least one. num_cameras: number of cameras of cameras on the path, ends included.
+        cameras: at least one. num_cameras: number of cameras on the path, ends included.
+        durations: time between cameras, one less than these, positive; None for equal ones.
     """
-    if len(cameras) == num_cameras or len(cameras) == 1:
-        return list(cameras) if len(cameras) == num_cameras else [cameras[0]] * num_cameras
-    times, keys = np.linspace(0, len(cameras) - 1, num_cameras), np.arange(len(cameras))
+    if len(cameras) == 1:
+        return [cameras[0]] * num_cameras
+    if len(cameras) == num_cameras and durations is None:
+        return list(cameras)
+    keys = np.arange(len(cameras)) if durations is None else np.concatenate([[0.0], np.cumsum(durations)])
+    times = np.linspace(0, keys[-1], num_cameras)
     frames = np.array([camera.to_world for camera in cameras])
     positions = PchipInterpolator(keys, frames[:, :3, 3])(times)
     rotations = RotationSpline(keys, Rotation.from_matrix(frames[:, :3, :3]))(times).as_matrix()

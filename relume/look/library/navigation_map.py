@@ -1,7 +1,12 @@
-"""Sun's navigation map: Cook–Torrance materials in the plane of Fresnel reflectance and roughness (Sun 2007, 4.2).
+"""Sun's navigation maps: Cook–Torrance materials in the plane of Fresnel reflectance and roughness (Sun 2007, 4.2).
 
 Every point is a material: the colors and parameters of its triangle's corners, with barycentric interpolation. The
-roughness axis is logarithmic, because most fits have narrow highlights.
+roughness axis is logarithmic, because most fits have narrow highlights. Two tables of fits to MERL: Ngan 2005, as in
+the paper's figure 7, with metals of extinction k > 0; and Löw 2012, all with k = 0.
+
+A reflectance F0 is reached by any η from 1 to that of the dielectric, (1 + √F0)/(1 − √F0), each with its own k. The
+interpolated number is the dielectric fraction t, at which η = 1 + t (η_dielectric − 1), so that every point of a map
+has its F0 and k² ≥ 0.
 """
 
 from __future__ import annotations
@@ -9,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Shaped
@@ -21,7 +26,8 @@ from relume.look.library.materials import Preset, make_preset_terms, presets
 
 F64 = NDArray[np.float64]
 
-_TABLE = "low_cooktorrance_E2"  # uses the term's own Fresnel curve and has all hundred materials
+MapTable = Literal["ngan", "low"]
+_PRESET_TABLES: dict[MapTable, str] = {"ngan": "ngan_cooktorrance", "low": "low_cooktorrance_E2"}
 
 
 @dataclass(frozen=True)
@@ -31,12 +37,14 @@ class NavigationMap:
     Attributes:
         f0: reflectance at normal incidence. sigma: roughness of the highlight.
         triangles: indices of presets, counterclockwise in (f0, log σ).
+        numbers: interpolated numbers of each material: diffuse RGB, highlight RGB, dielectric fraction.
     """
 
     presets: tuple[Preset, ...]
     f0: Shaped[F64, " materials"]
     sigma: Shaped[F64, " materials"]
     triangles: Shaped[NDArray[np.int64], "triangles 3"]
+    numbers: Shaped[F64, "materials 7"] = field(repr=False)
     _corners: F64 = field(repr=False)
 
     def at(self, f0: float, sigma: float) -> list[dict[str, Any]]:
@@ -47,13 +55,14 @@ class NavigationMap:
         """
         if not (math.isfinite(f0) and math.isfinite(sigma) and sigma > 0):
             raise ParameterError("point", (f0, sigma), "f0 and σ as finite numbers, with σ above zero")
-        corners, weights = self._barycentric(np.array([f0, math.log(sigma)]))
-        position = weights @ self._corners[corners]
-        rows = np.array([_numbers(self.presets[k]) for k in corners])
-        colors = weights @ rows[:, :6]
-        return make_preset_terms(
-            "cook_torrance", [*map(float, colors), math.exp(position[1]), ior_from_reflectance(float(position[0])), 0.0]
-        )
+        position, numbers = self.interpolate(np.array([f0, math.log(sigma)]))
+        ior, extinction = conductor(float(position[0]), float(numbers[6]))
+        return make_preset_terms("cook_torrance", [*map(float, numbers[:6]), math.exp(position[1]), ior, extinction])
+
+    def interpolate(self, point: Shaped[F64, " 2"]) -> tuple[Shaped[F64, " 2"], Shaped[F64, " 7"]]:
+        """Return the position on the map nearest to a point (f0, log σ), and the interpolated `numbers` there."""
+        corners, weights = self._barycentric(point)
+        return weights @ self._corners[corners], weights @ self.numbers[corners]
 
     def _barycentric(self, point: F64) -> tuple[NDArray[np.int64], F64]:
         """Corners and weights in the triangle that contains a point, or at the nearest point of the hull."""
@@ -77,28 +86,43 @@ class NavigationMap:
         return pairs[best], np.array([1.0 - fraction[best], fraction[best]])
 
 
-def reflectance_from_ior(ior: float) -> float:
-    """Reflectance at normal incidence for a refractive index of at least 1."""
-    return float(((ior - 1) / (ior + 1)) ** 2)
+def reflectance(ior: float, extinction: float = 0.0) -> float:
+    """Reflectance at normal incidence for a refractive index and extinction."""
+    return ((ior - 1) ** 2 + extinction**2) / ((ior + 1) ** 2 + extinction**2)
 
 
-def ior_from_reflectance(f0: float) -> float:
-    """Refractive index for a reflectance at normal incidence below 1."""
+def dielectric_fraction(ior: float, extinction: float) -> float:
+    """Return t of a refractive index η ≥ 1: 0 at η = 1, 1 without extinction."""
+    dielectric = _dielectric_ior(reflectance(ior, extinction))
+    return 1.0 if dielectric == 1 else min((ior - 1) / (dielectric - 1), 1.0)
+
+
+def conductor(f0: float, fraction: float) -> tuple[float, float]:
+    """Return η and k with a reflectance below 1 at normal incidence and a dielectric fraction."""
+    ior = 1 + fraction * (_dielectric_ior(f0) - 1)
+    extinction2 = (f0 * (ior + 1) ** 2 - (ior - 1) ** 2) / (1 - f0)
+    # rounding leaves 1e-16 of a dielectric's k²
+    return ior, math.sqrt(extinction2) if extinction2 > 1e-12 else 0.0
+
+
+def _dielectric_ior(f0: float) -> float:
     root = math.sqrt(f0)
     return (1 + root) / (1 - root)
 
 
 def _numbers(preset: Preset) -> list[float]:
     diffuse, highlight = preset.terms
-    return [*diffuse["color"], *highlight["color"], *highlight["params"].values()]
+    params = highlight["params"]
+    return [*diffuse["color"], *highlight["color"], dielectric_fraction(params["ior"], params["extinction"])]
 
 
 @cache
-def navigation_map() -> NavigationMap:
-    """Return the map of the library's Cook–Torrance materials."""
-    map_presets = tuple(preset for preset in presets() if preset.id.startswith(_TABLE + "/"))
+def navigation_map(table: MapTable) -> NavigationMap:
+    """Return the map of a table of the library's Cook–Torrance materials."""
+    prefix = _PRESET_TABLES[table] + "/"
+    map_presets = tuple(preset for preset in presets() if preset.id.startswith(prefix))
     params = [preset.terms[1]["params"] for preset in map_presets]
-    f0 = np.array([reflectance_from_ior(p["ior"]) for p in params])
+    f0 = np.array([reflectance(p["ior"], p["extinction"]) for p in params])
     sigma = np.array([p["sigma"] for p in params])
     corners = np.column_stack([f0, np.log(sigma)])
     # scaled to equal axes: Delaunay maximizes the smallest angle
@@ -106,4 +130,5 @@ def navigation_map() -> NavigationMap:
     a, b, c = (corners[triangles[:, k]] for k in range(3))
     orientation = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     triangles[orientation < 0] = triangles[orientation < 0][:, [0, 2, 1]]
-    return NavigationMap(map_presets, f0, sigma, triangles, corners)
+    numbers = np.array([_numbers(preset) for preset in map_presets])
+    return NavigationMap(map_presets, f0, sigma, triangles, numbers, corners)

@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.look.library.navigation_map import ior_from_reflectance, navigation_map, reflectance_from_ior
+from relume.look.library.navigation_map import (
+    MapTable,
+    conductor,
+    dielectric_fraction,
+    navigation_map,
+    reflectance,
+)
 
 F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
@@ -17,33 +23,32 @@ Terms = Sequence[Mapping[str, Any]]
 _MODELS = ["lambert", "cook_torrance"]
 
 
-def path_on_map(start: Terms, end: Terms, interpolated: Terms, weight: float) -> Terms:
+def path_on_map(start: Terms, end: Terms, interpolated: Terms, weight: float, table: MapTable) -> Terms:
     """Interpolate two materials along a line on the map, linear in reflectance and in log roughness.
 
-    Colors are those of the map along the line, plus the interpolated difference between each end's colors and the map's
-    colors there, so that the path starts and ends at the given materials.
+    Colors and dielectric fraction are those of the map along the line, plus the interpolated difference between each
+    end's and the map's there, so that the path starts and ends at the given materials.
 
     Args:
         start, end: terms of complete looks. interpolated: interpolation of their parameters. weight: weight of `end`.
+        table: table of the map's materials.
     Returns:
         Terms like `interpolated`; unchanged `interpolated` if an end is not a diffuse plus a Cook–Torrance term.
     """
     if not (_is_on_map(start) and _is_on_map(end) and _is_on_map(interpolated)):
         return interpolated
-    end_positions = [_map_position(start), _map_position(end)]
-    map_position = (1 - weight) * end_positions[0] + weight * end_positions[1]
-    color_offsets = [
-        _colors(terms) - _map_colors(position) for terms, position in zip((start, end), end_positions, strict=True)
-    ]
-    colors = np.maximum(_map_colors(map_position) + (1 - weight) * color_offsets[0] + weight * color_offsets[1], 0)
-    params = {
-        **interpolated[1]["params"],
-        "sigma": math.exp(map_position[1]),
-        "ior": ior_from_reflectance(float(map_position[0])),
-    }
+    plane, weights = navigation_map(table), np.array([1 - weight, weight])
+    positions = np.array([_map_position(terms) for terms in (start, end)])
+    position = weights @ positions
+    offsets = np.array(
+        [_numbers(terms) - plane.interpolate(at)[1] for terms, at in zip((start, end), positions, strict=True)]
+    )
+    numbers = np.maximum(plane.interpolate(position)[1] + weights @ offsets, 0)
+    ior, extinction = conductor(float(position[0]), min(float(numbers[6]), 1.0))
+    params = {**interpolated[1]["params"], "sigma": math.exp(position[1]), "ior": ior, "extinction": extinction}
     return [
-        {**interpolated[0], "color": colors[0].tolist()},
-        {**interpolated[1], "color": colors[1].tolist(), "params": params},
+        {**interpolated[0], "color": numbers[:3].tolist()},
+        {**interpolated[1], "color": numbers[3:6].tolist(), "params": params},
     ]
 
 
@@ -52,20 +57,17 @@ def _is_on_map(terms: Terms) -> bool:
     if [term["model"] for term in terms] != _MODELS:
         return False
     params = terms[1]["params"]
-    return all(isinstance(params[name], int | float) for name in ("sigma", "ior")) and params["ior"] >= 1
+    return all(isinstance(params[name], int | float) for name in ("sigma", "ior", "extinction")) and params["ior"] >= 1
 
 
 def _map_position(terms: Terms) -> F64:
     """Position of a material on the map: (F0, log σ)."""
     params = terms[1]["params"]
-    return np.array([reflectance_from_ior(params["ior"]), math.log(params["sigma"])])
+    return np.array([reflectance(params["ior"], params["extinction"]), math.log(params["sigma"])])
 
 
-def _colors(terms: Terms) -> F64:
-    """Colors of both terms. (2, 3)"""
-    return np.array([term["color"] for term in terms], np.float64)
-
-
-def _map_colors(position: F64) -> F64:
-    """Colors of both terms at a position of the map. (2, 3)"""
-    return _colors(navigation_map().at(float(position[0]), math.exp(position[1])))
+def _numbers(terms: Terms) -> F64:
+    """Interpolated numbers of a material, as in `NavigationMap`. (7,)"""
+    params = terms[1]["params"]
+    fraction = dielectric_fraction(params["ior"], params["extinction"])
+    return np.array([*terms[0]["color"], *terms[1]["color"], fraction], np.float64)

@@ -116,6 +116,9 @@ def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
     if len(request.looks) > request.num_frames:
         value = Description(f"a list of {len(request.looks)} looks")
         raise ParameterError("looks", value, f"at most one look per frame, {request.num_frames} in total")
+    if request.durations is not None and len(request.durations) != len(request.looks) - 1:
+        value = Description(f"a list of {len(request.durations)} durations")
+        raise ParameterError("durations", value, f"{len(request.looks) - 1}, one from each look to the next")
     for index, partial in enumerate(request.looks):
         check_look(partial, transfer, f"/looks/{index}")
 

@@ -72,7 +72,9 @@ def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Ca
         if request.path.rotate == "environment":
             return [start] * request.num_frames
         return turntable(start, _turntable_pivot(request.path, view, transfer), request.num_frames)
-    return interpolate_cameras([_camera_of_frame(view, frame) for frame in request.path.cameras], request.num_frames)
+    cameras = [_camera_of_frame(view, frame) for frame in request.path.cameras]
+    durations = request.durations if len(cameras) == len(request.looks) else None
+    return interpolate_cameras(cameras, request.num_frames, durations)
 
 
 def crossed_material(request: Animation, name: str, transfer: OpenBake) -> str | None:
@@ -147,9 +149,9 @@ def look_document_at_frame(request: Animation, view: str | None, transfer: OpenB
 
 def _interpolated_document(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:
     """Interpolate the look document of a frame; only its two keyframes are completed."""
-    if len(request.looks) == request.num_frames:
+    if len(request.looks) == request.num_frames and request.durations is None:
         return looks.complete(request.looks[index], default)
     position = index / max(1, request.num_frames - 1)
-    first, second, weight = enclosing_keyframes(len(request.looks), position)
+    first, second, weight = enclosing_keyframes(len(request.looks), position, request.durations)
     keys = dict.fromkeys((first, second))  # only one if the frame is a keyframe
     return interpolate_looks([looks.complete(request.looks[k], default) for k in keys], weight, request.interpolation)

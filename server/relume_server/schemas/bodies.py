@@ -128,6 +128,7 @@ class MeasuredBody(Body):
     """A measured material; looks refer to it by `data`, `terms` are its initial terms.
 
     `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel.
+    `warnings`: what the conversion from another layout than MERL changed.
     """
 
     id: str
@@ -138,6 +139,7 @@ class MeasuredBody(Body):
     thumbnail: str
     lobes_error: tuple[float, float, float]
     homomorphic_error: tuple[float, float, float]
+    warnings: list[str]
 
 
 class BtfBody(Body):

@@ -19,6 +19,7 @@ MAX_LOOKS = 1000
 MAX_FRAMES = 3600
 MAX_LISTED_FRAMES = 600  # frames per POST /api/renders/looks
 MAX_LISTED_BYTES = 16 << 20
+Duration = Annotated[float, Field(ge=1e-3, le=1e6, allow_inf_nan=False)]
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
 TurntableSubject = Literal["camera", "object", "environment"]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
@@ -40,7 +41,9 @@ class Turntable(Body):
 
 
 class CameraPath(Body):
-    """Interpolate cameras, spaced evenly over the frames; one frame each if no number of frames is given."""
+    """Interpolate cameras, spaced evenly over the frames, or as the looks if there are equally many; one frame each
+    if no number of frames is given.
+    """
 
     cameras: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
 
@@ -58,14 +61,16 @@ Path = Annotated[
 
 
 class Keyframes(Body):
-    """Looks of a bake, perhaps partial. With `frames` they are keyframes, spaced evenly, and the looks between are
-    interpolated. `interpolation`: by parameters, or along the material map (GET /api/materials/map) if both materials
-    are of its model.
+    """Looks of a bake, perhaps partial. With `frames` they are keyframes, spaced evenly or by `durations`, relative
+    times from each to the next, and the looks between are interpolated. `interpolation`: by parameters, or along the
+    material map (GET /api/materials/map) if both materials are of its model: "map" is that of Ngan's fits, "map_low"
+    that of Löw's.
     """
 
     bake: Id
     looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
     frames: Frames | None = None
+    durations: Annotated[list[Duration], Field(max_length=MAX_LOOKS - 1)] | None = None
     interpolation: InterpolationMode = "parameters"
 
     @property

@@ -65,3 +65,11 @@ def test_a_path_of_one_camera_is_constant(num):
 def test_as_many_frames_as_cameras_are_the_cameras():
     keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9)]
     assert interpolate_cameras(keys, 2) == keys
+
+
+def test_a_path_reaches_its_cameras_after_their_durations():
+    keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9, 0.5), camera([5, 1, -1], 2.0, 1.0)]
+    cameras = interpolate_cameras(keys, 5, [1.0, 3.0])
+    for key, frame in zip(keys, (cameras[0], cameras[1], cameras[4]), strict=True):
+        np.testing.assert_allclose(frame.to_world, key.to_world, atol=1e-12)
+    assert interpolate_cameras(keys, 3, [1.0, 3.0])[1].to_world[0, 3] > keys[1].to_world[0, 3]

@@ -20,11 +20,17 @@ import { Section } from "../../ui/Section";
 import { AlbedoInfo } from "./AlbedoInfo";
 import { GlassControls } from "./glass/GlassControls";
 import { TermCard } from "./TermCard";
-import { defaultTerm, isMirror, modelsFor } from "./terms";
+import { defaultTerm, isMirror, LIGHT_VIEW, lightViewTerm, modelsFor } from "./terms";
 
 function replaceTerms(label: string, material: string, next: unknown): void {
   history.endGesture();
   editValue(label, jsonPointer("materials", material, "terms"), next);
+}
+
+function newTerm(name: string): Term | null {
+  if (name === LIGHT_VIEW.name) return lightViewTerm(models.value);
+  const model = models.value.find((m) => m.model === name);
+  return model === undefined ? null : defaultTerm(model);
 }
 
 function AddTerm({ material }: { material: string }) {
@@ -35,8 +41,8 @@ function AddTerm({ material }: { material: string }) {
       value=""
       disabled={selectedTerms.value.length >= MAX_TERMS}
       onChange={(event) => {
-        const model = models.value.find((m) => m.model === event.currentTarget.value);
-        if (model !== undefined) replaceTerms("Add layer", material, [...selectedTerms.value, defaultTerm(model)]);
+        const added = newTerm(event.currentTarget.value);
+        if (added !== null) replaceTerms("Add layer", material, [...selectedTerms.value, added]);
         event.currentTarget.value = "";
       }}
     >
@@ -46,6 +52,7 @@ function AddTerm({ material }: { material: string }) {
           {m.label}
         </option>
       ))}
+      <option value={LIGHT_VIEW.name}>{LIGHT_VIEW.label}</option>
     </select>
   );
 }

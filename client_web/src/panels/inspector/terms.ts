@@ -1,6 +1,6 @@
 /** Creates terms with a model's defaults, and changes a term's model, keeping shared settings. */
 import { isImageReference } from "../../state/document/imageReference";
-import type { ModelBody, Term } from "../../protocol";
+import type { DrawnCurve, ModelBody, Term } from "../../protocol";
 import { materialOf, modelOf } from "../../state/scene";
 
 /** Labels of a material's texture slots. */
@@ -35,6 +35,21 @@ export function defaultTerm(model: ModelBody): Term {
     texture: null,
     curves: {},
   };
+}
+
+/** "LV" of Ben-Artzi 2006, table 1: diffuse, times a drawn curve of the light angle and one of the view angle. Both start
+ * at one. */
+export const LIGHT_VIEW = { name: "light_view", label: "Light–view, LV (diffuse, drawn)" };
+
+export function lightViewTerm(models: readonly ModelBody[]): Term | null {
+  const lambert = models.find(({ model }) => model === "lambert");
+  const one: DrawnCurve = {
+    points: [
+      [0, 1],
+      [90, 1],
+    ],
+  };
+  return lambert === undefined ? null : { ...defaultTerm(lambert), curves: { theta_i: one, theta_o: one } };
 }
 
 /** The models that a term can have: measured models only if it refers to a measurement of their kind. */

@@ -12,7 +12,7 @@ import {
 } from "./libraryItems";
 import { deleteJob, GEOMETRIES, isRunning, isBeingMade, btfJobs, jobText, btfUploadProgress, stopJob } from "./btfJobs";
 
-export const MATERIAL_FILES = ".binary,.zip,.btf";
+export const MATERIAL_FILES = ".binary,.bsdf,.brdf,.zip,.btf";
 const MESH_FILES = ".glb,.obj,.ply,.zip";
 
 function BtfJob({ work }: { work: BtfJobBody }) {

@@ -56,8 +56,9 @@ function fittedEntry({ id, name, source, terms, model: modelName, group: groupNa
   };
 }
 
-function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): LibraryEntry {
-  const description = `${name}, measured. Exact until you edit its curves.`;
+function measuredEntry({ id, name, thumbnail, terms, warnings }: MeasuredBody): LibraryEntry {
+  const exact = `${name}, measured. Exact until you edit its curves.`;
+  const description = [exact, ...warnings.map((warning) => `Note: ${warning}.`)].join(" ");
   return { id, name, description, thumbnail, terms, model: MEASURED, group: null };
 }
 
@@ -140,7 +141,7 @@ export const resumeJob = (id: string) => startJob(() => continueJob(id));
 
 const BTF_SUFFIXES = [".zip", ".btf"];
 
-/** A ZIP of images or a .btf file is a BTF, anything else a MERL file. */
+/** A ZIP of images or a .btf file is a BTF, anything else a BRDF. */
 export async function importMaterial(file: File): Promise<void> {
   if (BTF_SUFFIXES.some((suffix) => file.name.toLowerCase().endsWith(suffix))) await startJob(() => importImages(file));
   else await importMeasured(file);
@@ -152,7 +153,7 @@ export async function importMaterials(files: readonly File[]): Promise<void> {
   for (const file of files) await importMaterial(file);
 }
 
-/** Import a MERL file and list it among the measurements. */
+/** Import a measured BRDF and list it among the measurements. */
 async function importMeasured(file: File): Promise<void> {
   await reportErrors(async () => {
     materialUploadProgress.value = 0;
@@ -160,7 +161,7 @@ async function importMeasured(file: File): Promise<void> {
       const material = await uploadMeasured(file, (fraction) => (materialUploadProgress.value = fraction));
       measured.value = await listMeasured();
       model.value = MEASURED;
-      showNote(`“${material.name}” added to the library.`);
+      showNote([`“${material.name}” added to the library.`, ...material.warnings].join(" Note: "));
     } finally {
       materialUploadProgress.value = null;
     }

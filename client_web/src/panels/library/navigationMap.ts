@@ -5,6 +5,10 @@ export interface HighlightRange {
   f0: [low: number, high: number];
   sigma: [low: number, high: number];
 }
+export interface Highlight {
+  f0: number;
+  sigma: number;
+}
 export interface MapPosition {
   x: number;
   y: number;
@@ -15,7 +19,7 @@ const interpolate = (fraction: number, [low, high]: [number, number]) =>
   low + Math.min(1, Math.max(0, fraction)) * (high - low);
 
 /** Range over the materials on the map; at least two. */
-export function mapRange(points: readonly { f0: number; sigma: number }[]): HighlightRange {
+export function mapRange(points: readonly Highlight[]): HighlightRange {
   const [f0, sigma] = [points.map((p) => p.f0), points.map((p) => p.sigma)];
   return { f0: [Math.min(...f0), Math.max(...f0)], sigma: [Math.min(...sigma), Math.max(...sigma)] };
 }
@@ -24,7 +28,7 @@ const mean = (value: ParamValue | undefined, otherwise: number): number =>
   value === undefined ? otherwise : typeof value === "number" ? value : (value[0] + value[1] + value[2]) / 3;
 
 /** Position of a material's highlight on the map; null if it has no Cook–Torrance highlight. */
-export function highlightOf(terms: readonly Term[]): { f0: number; sigma: number } | null {
+export function highlightOf(terms: readonly Term[]): Highlight | null {
   const params = terms.find(({ model }) => model === "cook_torrance")?.params;
   if (params === undefined) return null;
   const [n, k] = [mean(params.ior, 1.5), mean(params.extinction, 0)];
@@ -35,7 +39,7 @@ const squareRootRange = (range: HighlightRange): [number, number] => [Math.sqrt(
 const logRange = (range: HighlightRange): [number, number] => [Math.log(range.sigma[0]), Math.log(range.sigma[1])];
 
 /** Position in the unit square; smooth and dark is at the upper left. */
-export function positionOf(point: { f0: number; sigma: number }, range: HighlightRange): MapPosition {
+export function positionOf(point: Highlight, range: HighlightRange): MapPosition {
   return {
     x: fractionOf(Math.sqrt(point.f0), squareRootRange(range)),
     y: fractionOf(Math.log(point.sigma), logRange(range)),
@@ -43,7 +47,7 @@ export function positionOf(point: { f0: number; sigma: number }, range: Highligh
 }
 
 /** Inverse of `positionOf`; points outside the square are clamped to its edge. */
-export function highlightAt(position: MapPosition, range: HighlightRange): { f0: number; sigma: number } {
+export function highlightAt(position: MapPosition, range: HighlightRange): Highlight {
   return {
     f0: interpolate(position.x, squareRootRange(range)) ** 2,
     sigma: Math.exp(interpolate(position.y, logRange(range))),

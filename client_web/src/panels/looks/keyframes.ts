@@ -4,6 +4,7 @@ import { history, type Keyframe } from "../../edit/history";
 import type { LooksRequest } from "../../protocol";
 import { scene } from "../../state/scene";
 import { hasFreeCamera } from "../../state/views";
+import { showNote } from "../../ui/toasts";
 
 export const MAX_KEYFRAMES = 24;
 export const [MIN_SECONDS, MAX_SECONDS] = [0.5, 20];
@@ -31,9 +32,34 @@ function replaceKeyframes(label: string, after: readonly Keyframe[]): void {
   history.endGesture();
 }
 
+export const [MIN_DURATION, MAX_DURATION] = [0.1, 100];
+
+/** Relative times from each keyframe to the next. */
+export const durations = computed(() => keyframes.value.slice(0, -1).map(({ duration }) => duration ?? 1));
+
+/** Time of each keyframe, as a fraction of the whole. */
+export const keyTimes = computed(() => {
+  const times = durations.value.reduce((sums, duration) => [...sums, (sums.at(-1) ?? 0) + duration], [0]);
+  const total = times.at(-1) || 1;
+  return times.map((time) => time / total);
+});
+
+/** Add keyframes in one step; false, with a note, if there is no room for all. */
+export function addKeyframes(label: string, added: readonly Keyframe[]): boolean {
+  const room = MAX_KEYFRAMES - keyframes.peek().length;
+  if (added.length <= room) replaceKeyframes(label, [...keyframes.peek(), ...added]);
+  else showNote(`The timeline has room for ${room} more looks, and ${added.length} were to be added.`);
+  return added.length <= room;
+}
+
 export function addKeyframe(keyframe: Keyframe): void {
-  if (keyframes.peek().length < MAX_KEYFRAMES)
-    replaceKeyframes(`Add ${keyframe.name} to timeline`, [...keyframes.peek(), keyframe]);
+  addKeyframes(`Add ${keyframe.name} to timeline`, [keyframe]);
+}
+
+export function setKeyframeDuration(index: number, duration: number): void {
+  const timed = keyframes.peek()[index];
+  if (timed !== undefined)
+    replaceKeyframes(`Time after ${timed.name}`, keyframes.peek().with(index, { ...timed, duration }));
 }
 
 export function removeKeyframe(index: number): void {

@@ -16,6 +16,11 @@ import { Slider } from "../../ui/Slider";
 import { ToggleButton } from "../../ui/ToggleButton";
 import {
   addKeyframe,
+  durations,
+  keyTimes,
+  MAX_DURATION,
+  MIN_DURATION,
+  setKeyframeDuration,
   interpolation,
   cameraPathMode,
   fewestKeyframes,
@@ -37,7 +42,8 @@ import { playhead, FPS, frameLookList, commitShownLook, numFrames, isPlaying, se
 
 const INTERPOLATIONS = [
   { value: "parameters", label: "Parameters", title: "Interpolate each parameter; roughness on a logarithmic scale" },
-  { value: "map", label: "Material map", title: "Move Cook–Torrance materials across the material map" },
+  { value: "map", label: "Material map", title: "Move Cook–Torrance materials across the material map (Ngan)" },
+  { value: "map_low", label: "Löw’s map", title: "Move Cook–Torrance materials across the map of Löw’s fits" },
 ] as const;
 
 const MOTION_LABELS: Record<CameraPathMode, string> = {
@@ -80,7 +86,6 @@ function keyframeHint(): string | null {
 
 function PlaybackControls() {
   const ready = frameLookList.value !== null;
-  const last = Math.max(1, keyframes.value.length - 1);
   return (
     <div class="timeline-transport">
       <IconButton
@@ -107,7 +112,7 @@ function PlaybackControls() {
         {ready && (
           <div class="timeline-marks" aria-hidden="true">
             {keyframes.value.map(({ name }, index) => (
-              <span key={`${index} ${name}`} style={{ left: `${(100 * index) / last}%` }} />
+              <span key={`${index} ${name}`} style={{ left: `${100 * (keyTimes.value[index] ?? 0)}%` }} />
             ))}
           </div>
         )}
@@ -138,7 +143,7 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
         disabled={frameLookList.value === null}
         onClick={() => {
           isPlaying.value = false;
-          seek(index / Math.max(1, last));
+          seek(keyTimes.value[index] ?? 0);
         }}
       >
         {name}
@@ -151,6 +156,16 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
             const camera = currentPose();
             if (camera !== null) setKeyframeCamera(index, camera);
           }}
+        />
+      )}
+      {index < last && (
+        <NumberField
+          label={`Relative time from ${name} to the next look`}
+          value={durations.value[index] ?? 1}
+          minimum={MIN_DURATION}
+          maximum={MAX_DURATION}
+          step={0.1}
+          onChange={(value) => setKeyframeDuration(index, value)}
         />
       )}
       <IconButton

@@ -1,7 +1,7 @@
 /** Exports the timeline as numbered frames in a ZIP, or as a video. */
 import { completeLook } from "../looks/abCompare";
 import { currentPose, startExport, type RenderQuality } from "../looks/exportImage";
-import { interpolation, keyframes, currentPath } from "../looks/keyframes";
+import { durations, interpolation, keyframes, currentPath } from "../looks/keyframes";
 import type { RenderRequest } from "../../protocol";
 import { FPS, numFrames, renderPath } from "./playback";
 
@@ -15,6 +15,7 @@ export function exportAnimation(format: "png" | "mp4", quality: RenderQuality): 
   return startExport("animation", fetchFrom, {
     format,
     looks,
+    durations: durations.value,
     interpolation: interpolation.value,
     fps: FPS,
     quality,

@@ -11,6 +11,7 @@ import { activeViewName } from "../../state/views";
 import { reportErrors, showNote } from "../../ui/toasts";
 import { crossingText } from "../looks/exportImage";
 import {
+  durations,
   interpolation,
   fewestKeyframes,
   keyframes,
@@ -136,6 +137,7 @@ effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
   const body = {
     frames: Math.max(numFrames.value, looks.length),
+    durations: durations.value,
     interpolation: interpolation.value,
     view: activeViewName.value,
   } satisfies Partial<LooksRequest>;

@@ -135,9 +135,11 @@ export async function deleteBtfJob(id: string): Promise<void> {
   await request(`${btfJobPath(id)}?delete_files=true`, { method: "DELETE" });
 }
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
-export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
-export const getMaterialAt = (f0: number, sigma: number) =>
-  getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
+/** Table of fits that a material map shows: Ngan 2005, as in Sun 2007, or Löw 2012. */
+export type MapTable = "ngan" | "low";
+export const getMaterialMap = (table: MapTable) => getJson<MaterialMapBody>(`/api/materials/map?table=${table}`);
+export const getMaterialAt = (f0: number, sigma: number, table: MapTable) =>
+  getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}&table=${table}`);
 /** Thumbnail of a library material with id "table/material". */
 export const materialThumbnailUrl = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;

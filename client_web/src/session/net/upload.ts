@@ -58,7 +58,7 @@ export function uploadImage(file: File, progress: (fraction: number) => void): P
   return postForm("/api/images", form, progress) as Promise<ImageBody>;
 }
 
-/** Upload a MERL file; the library lists it under its file name. */
+/** Upload a measured BRDF; the library lists it under its file name. */
 export function uploadMeasured(file: File, progress: (fraction: number) => void): Promise<MeasuredBody> {
   const form = new FormData();
   form.append("material", file);

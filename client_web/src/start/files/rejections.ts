@@ -3,7 +3,7 @@ import type { DroppedFile } from "./dropTypes";
 import { endsWith, isImportable, isSceneFile, MEASURED_SUFFIXES } from "./sceneFiles";
 
 /** Unsupported formats of measured materials. */
-const OTHER_MEASURED_SUFFIXES = [".brdf", ".bsdf", ".merl", ".mbdf"];
+const OTHER_MEASURED_SUFFIXES = [".merl", ".mbdf"];
 const UNSUPPORTED_SCENE_SUFFIXES = [
   ".fbx",
   ".blend",
@@ -31,7 +31,7 @@ function listFileNames(files: readonly DroppedFile[]): string {
   );
 }
 
-const MEASURED_MESSAGE = "Open a scene and drop measured materials on the Library: MERL (.binary) or BTF (.btf, .zip).";
+const MEASURED_MESSAGE = "Open a scene and drop measured materials on the Library: MERL (.binary), RGL (.bsdf), Cornell (.brdf) or BTF (.btf, .zip).";
 const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY or ZIP.";
 
 /** Advice for rejected files, by the type of the first. */

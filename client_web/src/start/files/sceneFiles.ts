@@ -10,7 +10,7 @@ const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif"
 export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
 
 /** Measured materials, for the library; a .zip may be one, too. */
-export const MEASURED_SUFFIXES = [".binary", ".btf"];
+export const MEASURED_SUFFIXES = [".binary", ".bsdf", ".brdf", ".btf"];
 
 export interface SceneFile extends DroppedFile {
   /** The files that the scene refers to. */

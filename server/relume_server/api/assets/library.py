@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path, Query
 from fastapi.concurrency import run_in_threadpool
 
 from relume.core.errors import NotFoundError
-from relume.look.library import navigation_map, presets
+from relume.look.library import MapTable, navigation_map, presets
 from relume_server.api.pagination import PageDep
 from relume_server.io.png import A_DAY, PngResponse
 from relume_server.schemas.bodies import MapPoint, MaterialBody, MaterialMapBody
@@ -25,9 +25,12 @@ def list_materials(page: PageDep) -> list[MaterialBody]:
 
 
 @router.get("/map")
-def get_material_map() -> MaterialMapBody:
-    """Cook–Torrance materials of the library in the plane of reflectance and roughness, triangulated (Sun 2007)."""
-    nav_map = navigation_map()
+def get_material_map(table: MapTable = "ngan") -> MaterialMapBody:
+    """Cook–Torrance materials of the library in the plane of reflectance and roughness, triangulated (Sun 2007).
+
+    `table`: Ngan's fits, as in the paper, or Löw's.
+    """
+    nav_map = navigation_map(table)
     return MaterialMapBody(
         points=[
             MapPoint(id=preset.id, f0=f0, sigma=sigma)
@@ -39,10 +42,12 @@ def get_material_map() -> MaterialMapBody:
 
 @router.get("/map/at")
 def material_at(
-    f0: Annotated[float, Query(ge=0, le=1)], sigma: Annotated[float, Query(gt=0, le=10)]
+    f0: Annotated[float, Query(ge=0, le=1)],
+    sigma: Annotated[float, Query(gt=0, le=10)],
+    table: MapTable = "ngan",
 ) -> list[dict[str, Any]]:
     """Terms at any point of the map, interpolated between the surrounding materials."""
-    return navigation_map().at(f0, sigma)
+    return navigation_map(table).at(f0, sigma)
 
 
 @router.get("/{table}/{material}/thumbnail.png", response_class=PngResponse, name="get_material_thumbnail")

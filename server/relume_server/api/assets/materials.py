@@ -22,7 +22,7 @@ from relume_server.services import ServicesDep
 from relume_worker.paths import materials_path
 
 router = APIRouter(prefix="/api/materials/measured", tags=["materials"])
-MaterialFile = Annotated[UploadFile, File(description="MERL .binary")]
+MaterialFile = Annotated[UploadFile, File(description="MERL .binary, RGL .bsdf or Cornell .brdf")]
 MaterialName = Annotated[str, Form(max_length=200)]
 
 
@@ -34,7 +34,7 @@ async def import_measured(
     response: Response,
     name: MaterialName = "",
 ) -> MeasuredBody:
-    """Import a MERL file in a separate process; the body has its name for looks."""
+    """Import a MERL, RGL or Cornell file in a separate process; the body has its name for looks."""
     identity = await store_upload(material, name, "material", reservation, services)
     response.headers["Location"] = f"/api/materials/measured/{identity}"
     return await run_in_threadpool(get_measured, identity, services)
@@ -90,4 +90,5 @@ def _body(record: MaterialRecord) -> MeasuredBody:
         thumbnail=f"/api/materials/measured/{record.id}/thumbnail.png",
         lobes_error=record.lobes_error,
         homomorphic_error=record.homomorphic_error,
+        warnings=list(record.warnings),
     )
