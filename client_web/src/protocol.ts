@@ -23,6 +23,7 @@ export type {
   HelloMessage,
   AlbedoBody,
   ZernikeFitBody,
+  ZernikeFitRequest,
   LooksRequest,
   LookEntry,
   LooksBody,
