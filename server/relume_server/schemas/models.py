@@ -80,7 +80,7 @@ class BallRequest(TermsRequest):
 
 
 class ZernikeFitBody(Body):
-    """What free cameras draw of a term while they move: `functions` of `available` basis functions, with a `residual`
+    """Picture of a term while a free camera moves: `functions` of `available` basis functions, with a `residual`
     (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than
     available; `drawn_by`: functions alone; lights: the environment's highlight is summed over visible lights, other
     light uses functions; rays: reflections are ray traced by the server, and blurred environment in a browser.
