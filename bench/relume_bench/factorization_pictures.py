@@ -87,8 +87,8 @@ def _light_spectra(radiance: NDArray[np.float32], normals: F64, cosine: F64, zen
     for p, (n, t, b) in enumerate(zip(normals, tangent, bitangent, strict=True)):
         around = np.cos(azimuth)[:, None] * t + np.sin(azimuth)[:, None] * b
         directions = sine[:, None, None] * around + zenith.cosine[:, None, None] * n
-        seen = lookup(radiance, directions.reshape(-1, 3).astype(np.float32)).reshape(len(sine), num_azimuths, 3)
-        out[p] = np.einsum("tac,am->tmc", seen.astype(np.float64), waves, optimize=True)
+        samples = lookup(radiance, directions.reshape(-1, 3).astype(np.float32)).reshape(len(sine), num_azimuths, 3)
+        out[p] = np.einsum("tac,am->tmc", samples.astype(np.float64), waves, optimize=True)
     return out
 
 

@@ -1,4 +1,4 @@
-"""Representation of each term of a material by free cameras, for users: number of functions and error (Mahajan 2008)."""
+"""Representation of each term of a material by free cameras, for users: functions and error (Mahajan 2008)."""
 
 from __future__ import annotations
 
