@@ -9,7 +9,7 @@ from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS, NUM_ROWS
 from relume.live.free_camera.basis.table_index import MIN_COSINE
-from relume.math.zernike import NUM_FUNCTIONS, recurrence
+from relume.math.zernike import NUM_FUNCTIONS, recurrence, recurrence_by_degree
 from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
@@ -51,7 +51,7 @@ def _sum_numpy(
     stored_scene: StoredScene, light: F32, tables: Tables, camera_position: F32, probe: int, first: int
 ) -> F64:
     """Sum the light (3, K) of a probe with the tables of a kind, which begin at column `first`. (groups, 3)"""
-    probes, recurrence_table = stored_scene.probes, recurrence()
+    probes, recurrence_table = stored_scene.probes, recurrence_by_degree()
     n, t = probes.normal[probe].astype(np.float64), probes.tangent[probe].astype(np.float64)
     wo = camera_position.astype(np.float64) - probes.position[probe]
     x, y, z = np.array([t, np.cross(n, t), n]) @ wo / np.linalg.norm(wo)

@@ -180,8 +180,16 @@ GROUPS = (
     Group("relume_bench.btf_several", ("btf.several_ratio", "btf.five_vs_two")),
     Group(
         "relume_bench.factorization",
-        ("factorization.phong_terms_per_exponent", "factorization.torrance_sparrow_terms_sigma2"),
+        (
+            "factorization.phong_terms_per_exponent",
+            "factorization.torrance_sparrow_terms_sigma2",
+            "factorization.sphere_eigenvalues",
+            "factorization.sphere_terms_per_exponent",
+            "factorization.hemisphere_eigenvalues",
+        ),
     ),
+    Group("relume_bench.factorization_measured", ("factorization.measured_terms",)),
+    Group("relume_bench.factorization_pictures", ("factorization.picture_rmse",)),
     Group(
         "relume_bench.probes",
         (

@@ -60,12 +60,13 @@ export interface Look {
   display: DisplayLook;
 }
 
-/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it. */
+/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it. `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate. */
 export interface MaterialLook {
   terms: TermLook[];
   shadow_catcher?: boolean;
   normal_map?: NormalMapLook | null;
   glass?: GlassLook | null;
+  basis_functions?: 1 | 3 | 6 | 10 | 15 | 21 | 28 | 36 | null;
 }
 
 /** All surfaces of a material emit and are visible; emission is radiance. `image`: an uploaded image, "image:<id>", by which they emit: radiance is emission times its linear RGB. None: they emit as in the scene. */
@@ -180,6 +181,7 @@ export const RANGES = {
 } as const;
 
 export const MAX_TERMS = 16;
+export const BASIS_FUNCTIONS = [1, 3, 6, 10, 15, 21, 28, 36];
 export const MAX_LIGHTS = 64;
 export const MAX_LIGHT_NAME = 80;
 export const MAX_CURVE_POINTS = 4096;

@@ -11,7 +11,7 @@ export const MAX_VISIBLE_VIEWS = 4;
 
 export const MAX_CAMERA_PIXELS = 2304000;
 
-export const PROBES_LAYOUT = 3;
+export const PROBES_LAYOUT = 4;
 
 export const MAX_PERSON_NAME = 40;
 
@@ -288,6 +288,12 @@ export interface ViewMessage {
 export interface ViewsMessage {
   type: "views";
   names: string[];
+}
+
+/** All terms of a material, and the `basis_functions` of its look. */
+export interface ZernikeFitRequest {
+  terms: Record<string, unknown>[];
+  basis_functions?: 1 | 3 | 6 | 10 | 15 | 21 | 28 | 36 | null;
 }
 
 /** Albedo of a material with white textures: `mean` over all view directions, and the `max` in any channel, at `max_angle_degrees` from the normal. */
@@ -989,12 +995,13 @@ export interface ViewportBody {
   opens_inside: boolean;
 }
 
-/** Factorization of a term for free cameras: `functions` basis functions of the incident light, with a `residual` (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than available; `is_mirror`: drawn as a blurred mirror instead. */
+/** Picture of a term while a free camera moves: `functions` of `available` basis functions, with a `residual` (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than available; `drawn_by`: functions alone; lights: the environment's highlight is summed over visible lights, other light uses functions; rays: reflections are ray traced by the server, and blurred environment in a browser. */
 export interface ZernikeFitBody {
   functions: number;
+  available: number;
   residual: number;
   required_functions: number | null;
-  is_mirror: boolean;
+  drawn_by: "functions" | "lights" | "rays";
 }
 
 export type ClientMessage =

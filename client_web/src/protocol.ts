@@ -24,6 +24,7 @@ export type {
   HelloMessage,
   AlbedoBody,
   ZernikeFitBody,
+  ZernikeFitRequest,
   LooksRequest,
   LookEntry,
   LooksBody,

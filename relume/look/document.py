@@ -21,7 +21,7 @@ from relume.core.validation import (
 from relume.image_io.ocio.view import MAX_NAME
 from relume.look.glass import complete_glass, default_glass
 from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
-from relume.look.model import BackgroundKind, Look, PathFilter, ToneMap
+from relume.look.model import BackgroundKind, BasisFunctions, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
@@ -39,7 +39,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "transport": {"show": "all", "bounces": MAX_BOUNCES},
     "display": {"exposure": 0.0, "tone_map": "agx"},
 }
-_OPTIONAL = {"normal_map": None, "glass": None}  # of materials
+_OPTIONAL = {"normal_map": None, "glass": None, "basis_functions": None}  # of materials
 _SECTIONS = tuple(Look.model_fields)
 
 
@@ -124,12 +124,24 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
         raise invalid_value((*pointer, "shadow_catcher"), fields["shadow_catcher"], "true or false")
     normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map"))
     glass = _complete_glass((*pointer, "glass"), fields.pop("glass"), default[name].get("glass"))
+    functions = _complete_basis_functions((*pointer, "basis_functions"), fields.pop("basis_functions"))
     return {
         **fields,
         "terms": _complete_terms((*pointer, "terms"), fields["terms"], previous[name]["terms"]),
         **normals,
         **glass,
+        **functions,
     }
+
+
+def _complete_basis_functions(pointer: Pointer, partial: Any) -> dict[str, Any]:
+    """Check the number of basis functions of a material; empty if it is automatic."""
+    if partial is None:
+        return {}
+    allowed = get_args(BasisFunctions)
+    if isinstance(partial, bool) or partial not in allowed:
+        raise invalid_value(pointer, partial, f"null, or one of {', '.join(map(str, allowed))}")
+    return {"basis_functions": int(partial)}
 
 
 def _complete_glass(pointer: Pointer, partial: Any, default: Mapping[str, Any] | None) -> dict[str, Any]:

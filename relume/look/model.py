@@ -19,6 +19,8 @@ LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
 PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
+BasisFunctions = Literal[1, 3, 6, 10, 15, 21, 28, 36]
+"""Numbers of Zernike functions up to a degree; other prefixes would not be symmetric about the normal."""
 
 
 class DrawnCurve(TypedDict):
@@ -80,12 +82,15 @@ class MaterialLook(_FrozenModel):
 
     A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects.
     `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it.
+    `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out
+    factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate.
     """
 
     terms: tuple[TermLook, ...]
     shadow_catcher: bool = False
     normal_map: NormalMapLook | None = None
     glass: GlassLook | None = None
+    basis_functions: BasisFunctions | None = None
 
     @property
     def normals(self) -> NormalMap | None:

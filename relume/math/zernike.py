@@ -63,6 +63,11 @@ def num_functions(degree: int) -> int:
     return (degree + 1) * (degree + 2) // 2
 
 
+def degree_of(num: int) -> int:
+    """Highest degree whose functions are among the first `num`, at least 1 of them."""
+    return (math.isqrt(8 * num + 1) - 3) // 2
+
+
 @lru_cache(maxsize=DEGREE + 1)
 def recurrence(degree: int = DEGREE) -> Recurrence:
     """Recurrence table of all functions up to a degree, at most `DEGREE`."""
@@ -76,6 +81,19 @@ def recurrence(degree: int = DEGREE) -> Recurrence:
     order, cosine, sine = (np.ascontiguousarray(table[:, k], np.int32) for k in (0, 2, 3))
     norm, a, b, c = (np.ascontiguousarray(table[:, k], np.float32) for k in (1, 4, 5, 6))
     return Recurrence(order=order, norm=norm, cosine=cosine, sine=sine, a=a, b=b, c=c)
+
+
+@lru_cache(maxsize=1)
+def recurrence_by_degree() -> Recurrence:
+    """Recurrence table sorted by degree: the functions up to a degree are those of its first `num_rows` rows."""
+    table = recurrence()
+    by_degree = np.argsort(DEGREES[table.cosine], kind="stable")
+    return Recurrence._make(field[by_degree] for field in table)
+
+
+def num_rows(degree: int) -> int:
+    """Number of rows of `recurrence_by_degree` up to a degree; 0 for degree −1."""
+    return (degree + 2) ** 2 // 4
 
 
 def _recurrence(s: int, m: int) -> tuple[float, float, float]:

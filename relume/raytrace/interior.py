@@ -177,7 +177,7 @@ def _at_camera_height(embree: EmbreeScene, position: Shaped[F64, " 3"]) -> Shape
     if not np.isfinite(down):
         return position
     height = min(_CAMERA_HEIGHT_M, 0.5 * (down + up)) if np.isfinite(up) else min(_CAMERA_HEIGHT_M, down)
-    return position + np.array([0.0, height - down, 0.0])
+    return np.asarray(position + np.array([0.0, height - down, 0.0]), np.float64)
 
 
 def _with_back_to_wall(embree: EmbreeScene, position: Shaped[F64, " 3"]) -> tuple[Shaped[F64, " 3"], Shaped[F64, " 3"]]:

@@ -22,6 +22,7 @@ from relume.look import LightLook, Look
 from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
 from relume.look.glass import GLASS_RANGES
 from relume.look.light_validation import LIGHT_RANGES, default_light
+from relume.look.model import BasisFunctions
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.validate import MAX_LIGHT_NAME, MAX_LIGHTS
 from relume_server.schemas import (
@@ -84,6 +85,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     renders.LooksRequest,
     renders.RenderRequest,
     models.TermsRequest,
+    models.ZernikeFitRequest,
     bodies.ComparisonRequest,
     bodies.ShareRequest,
     comments.CommentRequest,
@@ -170,13 +172,14 @@ def generate_look() -> str:
     blocks.append(f"export const DEFAULTS: Readonly<Pick<Look, {names}>> = {{\n{sections}}};")
     ranges = "".join(f"  {name}: {_ranges(fields)},\n" for name, fields in {**RANGES, **_EXTRA_RANGES}.items())
     blocks.append(f"/** Ranges of the numbers of each field. */\nexport const RANGES = {{\n{ranges}}} as const;")
-    blocks.append("\n".join(f"export const {name} = {literal(value)};" for name, value in _MAXIMA.items()))
+    blocks.append("\n".join(f"export const {name} = {literal(value)};" for name, value in _CONSTANTS.items()))
     return "\n\n".join(blocks) + "\n"
 
 
 _EXTRA_RANGES = {"light": LIGHT_RANGES, "glass": GLASS_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
-_MAXIMA = {
+_CONSTANTS = {
     "MAX_TERMS": MAX_TERMS,
+    "BASIS_FUNCTIONS": get_args(BasisFunctions),
     "MAX_LIGHTS": MAX_LIGHTS,
     "MAX_LIGHT_NAME": MAX_LIGHT_NAME,
     "MAX_CURVE_POINTS": MAX_POINTS,

@@ -189,8 +189,14 @@ def test_material_ids_are_16_bit_png(client: TestClient, baked: Baked) -> None:
 def test_free_camera_warnings_of_terms_are_reported(client: TestClient) -> None:
     terms = [{"model": "lambert"}, {"model": "phong", "params": {"exponent": 400.0}}]
     diffuse, sharp = client.post("/api/models/zernike-fit", json={"terms": terms}).json()
-    assert (diffuse["required_functions"], diffuse["is_mirror"]) == (1, False)
-    assert (sharp["required_functions"], sharp["is_mirror"]) == (None, True)
+    assert (diffuse["functions"], diffuse["required_functions"], diffuse["drawn_by"]) == (1, 1, "functions")
+    assert (sharp["functions"], sharp["required_functions"]) == (36, None)
+    assert sharp["drawn_by"] in ("lights", "rays")
+    chosen = client.post("/api/models/zernike-fit", json={"terms": terms, "basis_functions": 6}).json()
+    assert [(fit["functions"], fit["drawn_by"]) for fit in chosen] == [(6, "functions")] * 2
+    assert chosen[1]["residual"] > sharp["residual"]
+    refused = client.post("/api/models/zernike-fit", json={"terms": terms, "basis_functions": 12})
+    assert refused.status_code == 422
     assert 0 <= diffuse["residual"] < 0.01 < sharp["residual"] <= 1
     worded = [{"model": "phong", "params": {"exponent": "x"}}]
     for bad in ([], [{"model": "nothing"}], worded, [{"model": "lambert"}] * 99):

@@ -103,13 +103,15 @@ def get_record(folder: Path, identity: str) -> MaterialRecord:
     path = STORE.path(folder, identity)
     document = STORE.load_record(path)
     try:
-        errors = [_rgb(document[key]) for key in ("lobes_error", "homomorphic_error")]
+        lobes_error, homomorphic_error = (_rgb(document[key]) for key in ("lobes_error", "homomorphic_error"))
     except (KeyError, TypeError, ValueError) as error:
         raise STORE.damaged_error(path) from error
     warnings = document.get("warnings", [])
     if not (isinstance(warnings, list) and all(isinstance(warning, str) for warning in warnings)):
         raise STORE.damaged_error(path)
-    return MaterialRecord(identity, document["name"], document["created"], *errors, tuple(warnings))
+    return MaterialRecord(
+        identity, document["name"], document["created"], lobes_error, homomorphic_error, tuple(warnings)
+    )
 
 
 def source_path(data: str) -> Path:

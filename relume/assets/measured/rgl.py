@@ -24,6 +24,7 @@ from relume.assets.measured.tensor_file import read_tensors
 from relume.core.errors import MaterialError
 
 F64 = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 _MAX_AXIS = 1024
 _MAX_VALUES = 1 << 24  # of one array in memory, as float64
@@ -96,7 +97,7 @@ class RglBrdf:
                 total += (weight * weight_y * fx)[:, None] * self.values[p, t, row, ix + 1]
         return total
 
-    def _warp(self, slices: list[tuple[tuple[F64, F64], F64]], x: F64, y: F64) -> tuple[F64, F64]:
+    def _warp(self, slices: list[tuple[tuple[Indices, Indices], F64]], x: F64, y: F64) -> tuple[F64, F64]:
         """R: marginal distribution in y, conditional one in x, of the interpolated density."""
         height, width = self.density.shape[2:]
         (ix, fx), (iy, fy) = _cell(x, width), _cell(y, height)

@@ -52,11 +52,13 @@ class ProjectedMaterial(NamedTuple):
     """The terms of one material, projected to the basis and to lobes.
 
     Attributes:
-        terms: all of them. traces_lobes: narrow ones are not projected.
+        terms: all of them. degree: chosen degree of the basis, see `build_tables`; None: as high as they need.
+        traces_lobes: narrow ones are not projected.
         traced: narrow ones, for lobe rays; None for none.
     """
 
     terms: Sequence[Mapping[str, Any]]
+    degree: int | None
     traces_lobes: bool
     tables: Tables
     lobes: Lobes
@@ -64,13 +66,20 @@ class ProjectedMaterial(NamedTuple):
 
 
 def _project_terms(
-    terms: Sequence[Mapping[str, Any]], cached: ProjectedMaterial | None, traces_lobes: bool
+    terms: Sequence[Mapping[str, Any]], degree: int | None, cached: ProjectedMaterial | None, traces_lobes: bool
 ) -> ProjectedMaterial:
-    """Project the terms of a material. cached: its previous projection. traces_lobes: narrow terms are traced"""
-    if cached is not None and cached.terms == terms and cached.traces_lobes == traces_lobes:
+    """Project the terms of a material.
+
+    Args:
+        terms: of a complete look. degree: chosen for the basis; None: automatic. cached: its previous projection.
+        traces_lobes: narrow terms are traced.
+    """
+    if cached is not None and (cached.terms, cached.degree, cached.traces_lobes) == (terms, degree, traces_lobes):
         return cached
+    if degree is not None:  # nothing but the sum over the basis
+        return ProjectedMaterial(terms, degree, traces_lobes, build_tables([terms], [degree]), build_lobes([[]]), None)
     traced, stored = split_terms(terms) if traces_lobes else (None, terms)
-    return ProjectedMaterial(terms, traces_lobes, build_tables([stored]), build_lobes([stored]), traced)
+    return ProjectedMaterial(terms, None, traces_lobes, build_tables([stored]), build_lobes([stored]), traced)
 
 
 class MaterialState(NamedTuple):
@@ -98,6 +107,7 @@ class MaterialState(NamedTuple):
         previous: Self | None = None,
         normals: Sequence[NormalMap | None] | None = None,
         emission: Sequence[EmissionImage | None] | None = None,
+        degrees: Sequence[int | None] | None = None,
         *,
         is_blocking: bool = True,
         traces_lobes: bool = False,
@@ -108,6 +118,7 @@ class MaterialState(NamedTuple):
             terms: terms of each. previous: an earlier state, to reuse what has not changed.
             normals: normal-map overrides of each; None: none.
             emission: emitted image of each; None: none.
+            degrees: chosen degree of each, see `build_tables`; None: all are automatic.
             is_blocking: see `find_btf_materials`. traces_lobes: narrow terms are left to lobe rays.
         """
         none = [None] * len(terms)
@@ -116,7 +127,10 @@ class MaterialState(NamedTuple):
             for material_terms, normal_map, image in zip(terms, normals or none, emission or none, strict=True)
         )
         cached = previous.projected if previous is not None else [None] * len(terms)
-        projected = [_project_terms(each, item, traces_lobes) for each, item in zip(terms, cached, strict=True)]
+        projected = [
+            _project_terms(each, degree, item, traces_lobes)
+            for each, degree, item in zip(terms, degrees or none, cached, strict=True)
+        ]
         btf_materials = find_btf_materials(
             terms, previous.btf_materials.available if previous is not None else (), is_blocking=is_blocking
         )

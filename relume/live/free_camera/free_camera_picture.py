@@ -50,6 +50,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import get_texel_tables
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
 from relume.look.glass import GlassOfLook, glass_of
+from relume.math.zernike import degree_of
 from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
@@ -444,6 +445,7 @@ class FreeCameraPicture:
             names = self._transfer.material_names
             normals = [look.materials[name].normals for name in names]
             terms = [material_documents(look, name) for name in names]
+            counts = [look.materials[name].basis_functions for name in names]
             images = emission_images(geometries(look), self._transfer.emission_image)
             emission = [images.get(name) for name in names]
             materials = MaterialState.from_terms(
@@ -451,6 +453,7 @@ class FreeCameraPicture:
                 previous,
                 normals,
                 emission,
+                [None if count is None else degree_of(count) for count in counts],
                 is_blocking=not self._is_watched,
                 traces_lobes=traces_lobes,
             )

@@ -20,12 +20,15 @@ from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS
-from relume.live.free_camera.basis.table_index import view_direction_local
-from relume.math.zernike import recurrence
+from relume.live.free_camera.basis.table_index import powers_of_rotation, view_direction_local
+from relume.math.zernike import DEGREE, num_functions, num_rows, recurrence_by_degree
 from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+
+_NUM_ROWS = np.array([num_rows(degree) for degree in range(DEGREE + 1)])
+_NUM_FUNCTIONS = np.array([num_functions(degree) for degree in range(DEGREE + 1)])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
@@ -33,28 +36,30 @@ def _shade_probes(recurrence_table, viewed, vectors, non_environment, tables, st
     """Shade probes rows[start:stop].
 
     Args:
-        viewed, vectors, non_environment, tables: of `shade_probes`. scratch: (3, entries), (groups, 3)
-        out: `ProbeRadiance`, written.
+        recurrence_table: `recurrence_by_degree`. viewed, vectors, non_environment, tables: of `shade_probes`.
+        scratch: (3, entries), (2, orders), (groups, 3). out: `ProbeRadiance`, written.
     """
-    material, (radiance, environment), (rotated_light, outgoing) = viewed.material, out, scratch
-    num_groups, num_basis = outgoing.shape[0], rotated_light.shape[1]
+    material, (radiance, environment), (rotated_light, rotation, outgoing) = viewed.material, out, scratch
+    num_groups = outgoing.shape[0]
     for p in viewed.rows[start:stop]:
         view_coordinates = row, fraction, cosine_phi, sine_phi = view_direction_local(viewed, p)
         for group in range(num_groups):
             for channel in range(3):
                 radiance[p, group, channel] = environment[p, group, channel] = 0
         for kind in range(0, 6 if non_environment.shape[0] > 0 else 2, 2):
+            degree = tables.degree[material[p], kind // 2]
+            if degree < 0:
+                continue
             is_isotropic = is_anisotropic = False
             for group in range(num_groups):
                 outgoing[group, 0] = outgoing[group, 1] = outgoing[group, 2] = 0
                 is_isotropic |= tables.table_index[material[p], group, kind] >= 0
                 is_anisotropic |= tables.table_index[material[p], group, kind + 1] >= 0
             if is_isotropic:
-                re, im = np.float32(1), np.float32(0)
+                num_basis = _NUM_ROWS[degree]
+                powers_of_rotation(cosine_phi, sine_phi, degree, rotation)
                 for basis_index in range(num_basis):
                     m = recurrence_table.order[basis_index]
-                    if recurrence_table.a[basis_index] == 0 and m > 0:
-                        re, im = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
                     cosine, sine = recurrence_table.cosine[basis_index], recurrence_table.sine[basis_index]
                     for channel in range(3):
                         cosine_light = sine_light = np.float32(0)
@@ -71,7 +76,7 @@ def _shade_probes(recurrence_table, viewed, vectors, non_environment, tables, st
                                 non_environment[p, channel, sine],
                             )
                         rotated_light[channel, basis_index] = (
-                            re * cosine_light + im * sine_light if m > 0 else re * cosine_light
+                            rotation[0, m] * cosine_light + rotation[1, m] * sine_light if m > 0 else cosine_light
                         )
                 for group in range(num_groups):
                     table = tables.table_index[material[p], group, kind]
@@ -86,7 +91,8 @@ def _shade_probes(recurrence_table, viewed, vectors, non_environment, tables, st
                             ) * rotated_light[channel, basis_index]
                         outgoing[group, channel] = total
             if is_anisotropic:  # a function of its own: with its loop here, the one above is four times slower
-                _add_anisotropic(tables, material[p], kind, view_coordinates, vectors[p], non_environment, p, outgoing)
+                num_basis, light = _NUM_FUNCTIONS[degree], (vectors[p], non_environment)
+                _add_anisotropic(tables, material[p], kind, num_basis, view_coordinates, light, p, outgoing)
             for group in range(num_groups):
                 for channel in range(3):
                     if kind == 0:
@@ -98,9 +104,9 @@ def _shade_probes(recurrence_table, viewed, vectors, non_environment, tables, st
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _add_anisotropic(tables, material, kind, view_coordinates, vectors, non_environment, p, out):  # type: ignore[no-untyped-def]
+def _add_anisotropic(tables, material, kind, num_basis, view_coordinates, lights, p, out):  # type: ignore[no-untyped-def]
     """Add the products of probe p's coefficients with tables over θo and φo. out: (groups, 3)"""
-    row, fraction, cosine_phi, sine_phi = view_coordinates
+    (row, fraction, cosine_phi, sine_phi), (vectors, non_environment) = view_coordinates, lights
     azimuth = math.atan2(sine_phi, cosine_phi) / (np.float32(2) * np.float32(math.pi))
     column_coordinate = (azimuth - math.floor(azimuth)) * np.float32(NUM_COLUMNS)
     column: Any = min(np.int64(column_coordinate), NUM_COLUMNS - 1)
@@ -111,7 +117,7 @@ def _add_anisotropic(tables, material, kind, view_coordinates, vectors, non_envi
         table = tables.anisotropic[tables.table_index[material, group, kind + 1]]
         for channel in range(3):
             total = np.float32(0)
-            for k in range(vectors.shape[1]):
+            for k in range(num_basis):
                 lower = table[row, column, channel, k]
                 lower += column_fraction * (table[row, next_column, channel, k] - lower)
                 upper = table[row + 1, column, channel, k]
@@ -152,12 +158,13 @@ def shade_probes(
     """
     shape = len(vectors), NUM_GROUPS, 3
     outgoing = ProbeRadiance(np.zeros(shape, np.float32), np.zeros(shape, np.float32)) if out is None else out
-    table = recurrence()
+    table = recurrence_by_degree()
     other = np.empty((0, *vectors.shape[1:]), np.float32) if non_environment is None else non_environment
     args = table, viewed, vectors, other, tables
 
     def shade(start: int, stop: int) -> None:
-        scratch = np.empty((3, len(table.order)), np.float32), np.empty((NUM_GROUPS, 3), np.float32)
+        shapes = (3, len(table.order)), (2, DEGREE + 1), (NUM_GROUPS, 3)
+        scratch = tuple(np.empty(scratch_shape, np.float32) for scratch_shape in shapes)
         _shade_probes(*args, start, stop, scratch, outgoing)
 
     parallel_for_chunks(shade, len(viewed.rows))

@@ -14,7 +14,7 @@ from relume.brdf.albedo import directional_albedo, reflectance
 from relume.brdf.specular import specular_threshold
 from relume.brdf.term_validation import complete_term
 from relume_server.api.pagination import PageDep
-from relume_server.schemas.models import AlbedoBody, ModelBody, TermsRequest, ZernikeFitBody
+from relume_server.schemas.models import AlbedoBody, ModelBody, TermsRequest, ZernikeFitBody, ZernikeFitRequest
 
 router = APIRouter(prefix="/api/models", tags=["models"])
 
@@ -27,9 +27,9 @@ def list_models(page: PageDep) -> list[ModelBody]:
 
 
 @router.post("/zernike-fit")
-async def get_zernike_fit(request: TermsRequest) -> list[ZernikeFitBody]:
-    """Factorize terms for free cameras in the Zernike basis (Mahajan 2008)."""
-    return await run_in_threadpool(_zernike_fit, _complete(request))
+async def get_zernike_fit(request: ZernikeFitRequest) -> list[ZernikeFitBody]:
+    """Factorize the terms of a material for free cameras in the Zernike basis (Mahajan 2008)."""
+    return await run_in_threadpool(_zernike_fit, _complete(request), request.basis_functions)
 
 
 @router.post("/albedo")
@@ -49,7 +49,7 @@ def _albedo(terms: list[dict[str, Any]]) -> AlbedoBody:
     return AlbedoBody(mean=mean.tolist(), max=float(albedo[row].max()), max_angle_degrees=math.degrees(theta[row]))
 
 
-def _zernike_fit(terms: list[dict[str, Any]]) -> list[ZernikeFitBody]:
-    from relume.live.free_camera.basis.factorization_error import factorization_error  # imports compiled kernels
+def _zernike_fit(terms: list[dict[str, Any]], basis_functions: int | None) -> list[ZernikeFitBody]:
+    from relume.live.free_camera.factorization_error import factorization_errors  # imports compiled kernels
 
-    return [ZernikeFitBody(**factorization_error(term)._asdict()) for term in terms]
+    return [ZernikeFitBody(**error._asdict()) for error in factorization_errors(terms, basis_functions)]

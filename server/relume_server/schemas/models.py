@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from relume.look.document import MAX_TERMS
+from relume.look.model import BasisFunctions
 from relume_server.schemas.base import Body, Name
 
 
@@ -66,6 +67,12 @@ class TermsRequest(Body):
     terms: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_TERMS)]
 
 
+class ZernikeFitRequest(TermsRequest):
+    """All terms of a material, and the `basis_functions` of its look."""
+
+    basis_functions: BasisFunctions | None = None
+
+
 class BallRequest(TermsRequest):
     """Terms of a scene's `material`, which may use its textures."""
 
@@ -73,15 +80,17 @@ class BallRequest(TermsRequest):
 
 
 class ZernikeFitBody(Body):
-    """Factorization of a term for free cameras: `functions` basis functions of the incident light, with a `residual`
+    """Picture of a term while a free camera moves: `functions` of `available` basis functions, with a `residual`
     (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than
-    available; `is_mirror`: drawn as a blurred mirror instead.
+    available; `drawn_by`: functions alone; lights: the environment's highlight is summed over visible lights, other
+    light uses functions; rays: reflections are ray traced by the server, and blurred environment in a browser.
     """
 
     functions: int
+    available: int
     residual: float
     required_functions: int | None
-    is_mirror: bool
+    drawn_by: Literal["functions", "lights", "rays"]
 
 
 class AlbedoBody(Body):

@@ -30,7 +30,7 @@ MAX_FRAMES_IN_FLIGHT = 2
 MAX_VISIBLE_VIEWS = 4
 MAX_CAMERA_PIXELS = 1920 * 1200
 # layout version of GET /api/bakes/{id}/probes/…, which is cached forever: clients name it in the URL
-PROBES_LAYOUT = 3
+PROBES_LAYOUT = 4
 
 Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
 Degrees = Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)]

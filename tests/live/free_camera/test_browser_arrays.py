@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from relume.live.free_camera.basis.material_tables import build_tables
+from relume.live.free_camera.basis.material_tables import build_tables, needed_degrees
 from relume.live.free_camera.browser import geometry_arrays, material_arrays
 from relume.live.free_camera.frame import MaterialState
-from relume.math.zernike import DEGREE, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions
 from relume.probes.triangle_grids import ProbeGrid, node_index, num_nodes
 from relume.raytrace.surface_textures import Textures
 
@@ -18,9 +18,7 @@ GLOSSY = {**LAMBERT, "model": "blinn_phong", "params": {"exponent": 20.0}}
 
 
 def degrees_of(term: dict[str, object]) -> int:
-    even = build_tables([[term]]).isotropic
-    of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
-    return int(material_arrays._degrees(even, of_function[recurrence().cosine])[0])
+    return int(build_tables([[term]]).degree.max())
 
 
 def test_a_diffuse_table_needs_one_function_and_a_shiny_one_all() -> None:
@@ -29,12 +27,11 @@ def test_a_diffuse_table_needs_one_function_and_a_shiny_one_all() -> None:
 
 
 def test_degrees_below_the_bound_are_omitted() -> None:
-    of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
     table = np.zeros((2, 4, 3, NUM_FUNCTIONS), np.float32)
     table[:, ..., 0] = 1
     table[0, ..., NUM_FUNCTIONS - 1] = 0.5e-3
     table[1, ..., NUM_FUNCTIONS - 1] = 2e-3
-    assert material_arrays._degrees(table, of_function).tolist() == [0, DEGREE]
+    assert needed_degrees(table, DEGREES).tolist() == [0, DEGREE]
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
@@ -56,9 +53,9 @@ def test_materials_get_their_basis_functions() -> None:
     total, others = material_arrays.needed_function_counts(materials, bump)
     assert total.tolist() == [1, NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
     assert others.tolist() == [0, 0, NUM_FUNCTIONS, NUM_FUNCTIONS]
-    even = materials.tables.isotropic.copy()
-    even[0, ..., np.flatnonzero(recurrence().order == 2)[0]] = 0.1  # of degree 2
-    materials = materials._replace(tables=materials.tables._replace(isotropic=even))
+    degree = materials.tables.degree.copy()
+    degree[0, 0] = 2
+    materials = materials._replace(tables=materials.tables._replace(degree=degree))
     total, _ = material_arrays.needed_function_counts(materials, bump)
     assert total.tolist() == [num_functions(FAST_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
 

@@ -20,6 +20,7 @@ import { Section } from "../../ui/Section";
 import { AlbedoInfo } from "./AlbedoInfo";
 import { GlassControls } from "./glass/GlassControls";
 import { TermCard } from "./TermCard";
+import { BasisFunctions } from "./ZernikeFit";
 import { defaultTerm, isMirror, LIGHT_VIEW, lightViewTerm, modelsFor } from "./terms";
 
 function replaceTerms(label: string, material: string, next: unknown): void {
@@ -163,6 +164,9 @@ function MaterialInspector() {
       )}
       {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
       {!isShadowCatcher && <AddTerm material={material} />}
+      {!isShadowCatcher && materialLook !== undefined && (
+        <BasisFunctions material={material} materialLook={materialLook} />
+      )}
       {!isShadowCatcher && materialLook !== undefined && (
         <Section title="Metalness, normals, emission">
           <MetalnessImage material={material} terms={selectedTerms.value} />

@@ -197,7 +197,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
               />
             ))}
           {model !== undefined && <TermCurves model={model} term={term} index={index} />}
-          <ZernikeFit term={term} material={material} />
+          <ZernikeFit term={term} index={index} material={material} />
         </>
       )}
     </section>

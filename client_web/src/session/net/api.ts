@@ -11,6 +11,7 @@ import type {
   EnvironmentBody,
   ImageBody,
   ZernikeFitBody,
+  ZernikeFitRequest,
   LooksBody,
   LooksRequest,
   MaterialBody,
@@ -214,9 +215,9 @@ export async function getAlbedo(terms: Term[]): Promise<AlbedoBody> {
   return (await (await request("/api/models/albedo", json("POST", { terms }))).json()) as AlbedoBody;
 }
 
-/** Fit of terms in the Zernike basis of free-camera views. */
-export async function getInOut(terms: Term[]): Promise<ZernikeFitBody[]> {
-  return (await (await request("/api/models/zernike-fit", json("POST", { terms }))).json()) as ZernikeFitBody[];
+/** How free-camera views draw each term of a material in the Zernike basis. */
+export async function getZernikeFit(body: ZernikeFitRequest): Promise<ZernikeFitBody[]> {
+  return (await (await request("/api/models/zernike-fit", json("POST", body))).json()) as ZernikeFitBody[];
 }
 
 export async function startRender(body: RenderRequest): Promise<RenderBody> {

@@ -23,6 +23,19 @@ def table_row(cosine):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def powers_of_rotation(cosine_phi, sine_phi, degree, out):  # type: ignore[no-untyped-def]
+    """Compute cos mφ and sin mφ of all orders m up to a degree from cos φ, `cosine_phi`, and sin φ, `sine_phi`.
+
+    Args:
+        cosine_phi, sine_phi: of the angle. degree: the highest order. out: (2, ≥ degree + 1), written.
+    """
+    out[0, 0], out[1, 0] = np.float32(1), np.float32(0)
+    for m in range(1, degree + 1):
+        re, im = out[0, m - 1], out[1, m - 1]
+        out[0, m], out[1, m] = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def view_direction(viewed, p):  # type: ignore[no-untyped-def]
     """Return ωo of a probe, a tuple. viewed: `ViewedProbes`. p: the probe."""
     origin, position = viewed.camera_position, viewed.points.position

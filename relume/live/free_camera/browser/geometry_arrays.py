@@ -21,7 +21,7 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
 )
 from relume.live.free_camera.normal_mapping import basis_gradients
 from relume.live.free_camera.protocol import FreeCameraTransfer
-from relume.math.zernike import NUM_FUNCTIONS, recurrence
+from relume.math.zernike import NUM_FUNCTIONS, recurrence_by_degree
 from relume.probes.stored_scene import StoredScene
 from relume.probes.triangle_grids import ProbeGrid, num_nodes
 from relume.raytrace.surface_textures import Textures
@@ -38,7 +38,7 @@ def constants(transfer: FreeCameraTransfer) -> dict[str, Any]:
     `first_probes`: index of the first probe of each material, and the total at the end. `has_alpha_test`: surfaces have
     alpha masks, which shaders do not support.
     """
-    recurrence_fields = {name: field.tolist() for name, field in recurrence()._asdict().items()}
+    recurrence_fields = {name: field.tolist() for name, field in recurrence_by_degree()._asdict().items()}
     sizes = {"num_basis": NUM_FUNCTIONS, "table_rows": NUM_ROWS, "table_columns": NUM_COLUMNS}
     first = first_probes(transfer).tolist()
     texts = {"recurrence": recurrence_fields, "gradient_basis": basis_gradients().tolist(), "first_probes": first}

@@ -23,7 +23,7 @@ from relume.live.free_camera.highlights.interpolated_highlights import NORMAL_VA
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, lobe_widths
 from relume.live.free_camera.protocol import FreeCameraTransfer
-from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS, num_functions
 from relume.raytrace.surface_textures import EMISSION, NORMAL_MAP
 from relume.views.resolve import encode_pixels
 
@@ -33,7 +33,6 @@ Texels = NDArray[Any]
 _NUM_COARSE_FUNCTIONS = num_functions(FAST_DEGREE)  # nonzero functions of approximate coefficients
 # possible numbers of functions; a shader is generated for each
 _FUNCTION_COUNTS = np.array([1, _NUM_COARSE_FUNCTIONS, NUM_FUNCTIONS])
-_MAX_RESIDUAL = 1e-3  # RMS of omitted functions, relative to the table's
 _MAX_HALF = 65504.0
 _MAX_SCALED = 2.0**14  # of coefficients: well inside half precision
 
@@ -238,37 +237,16 @@ def needed_function_counts(
     Returns:
         For all light, and for light other than the environment, which highlights add separately.
     """
-    tables = materials.tables
-    isotropic_degrees, anisotropic_degrees = (
-        _degrees(tables.isotropic, DEGREES[recurrence().cosine]),
-        _degrees(tables.anisotropic, DEGREES),
-    )
+    degree = materials.tables.degree
 
     def needed(columns: slice) -> NDArray[np.int64]:
-        out = np.zeros(len(tables.table_index), np.int64)
-        for k, indices in enumerate(tables.table_index[..., columns]):
-            isotropic, anisotropic = indices[:, ::2], indices[:, 1::2]
-            degrees = [
-                *isotropic_degrees[isotropic[isotropic >= 0]],
-                *anisotropic_degrees[anisotropic[anisotropic >= 0]],
-            ]
-            out[k] = _FUNCTION_COUNTS[np.searchsorted(_FUNCTION_COUNTS, num_functions(max(degrees)))] if degrees else 0
-        return out
+        highest = degree[:, columns].max(axis=1).astype(np.int64)
+        count = _FUNCTION_COUNTS[np.searchsorted(_FUNCTION_COUNTS, (highest + 1) * (highest + 2) // 2)]
+        return np.where(highest >= 0, count, 0)
 
-    total = needed(slice(0, 4))
+    total = needed(slice(0, 2))
     total[has_map] = NUM_FUNCTIONS
-    return total, needed(slice(2, 6))
-
-
-def _degrees(tables: F32, function_degrees: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Greatest significant degree of each table (tables, …, functions), given the degrees of functions."""
-    size = np.square(tables, dtype=np.float64).sum(axis=tuple(range(1, tables.ndim - 1)))
-    energy_by_degree = np.stack(
-        [size[:, function_degrees == degree].sum(axis=1) for degree in range(DEGREE + 1)], axis=1
-    )
-    tail_energy = energy_by_degree[:, ::-1].cumsum(axis=1)[:, ::-1]  # of this degree and all higher ones
-    is_significant = tail_energy > _MAX_RESIDUAL**2 * np.maximum(tail_energy[:, :1], 1e-30)
-    return np.asarray(is_significant.sum(axis=1) - 1, np.int64).clip(0)
+    return total, needed(slice(1, 3))
 
 
 def _vector_arrays(name: str, vectors: F32, num: int) -> dict[str, Texels]:

@@ -26,8 +26,13 @@ from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import Lobes
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
-from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction, view_direction_local
-from relume.math.zernike import recurrence
+from relume.live.free_camera.basis.table_index import (
+    MIN_COSINE,
+    powers_of_rotation,
+    view_direction,
+    view_direction_local,
+)
+from relume.math.zernike import DEGREE, num_rows, recurrence_by_degree
 from relume.probes.stored_scene import ViewedProbes
 
 F32 = NDArray[np.float32]
@@ -36,20 +41,22 @@ F64 = NDArray[np.float64]
 _LUMINANCE = np.array(LUMINANCE, np.float32)
 _NON_ENVIRONMENT_COLUMN = 4  # column of `Tables.table_index` for other light in highlights
 _MIN_SINE = np.float32(1e-3)
+_NUM_ROWS = np.array([num_rows(degree) for degree in range(DEGREE + 1)])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type: ignore[no-untyped-def]
+def _sum_factors(tables, lobes, material, row, channel, num_basis, factors, step):  # type: ignore[no-untyped-def]
     """Sum the tables and albedos of a material's terms with a highlight.
 
     Args:
         tables, lobes: tables and lobes of all materials. material, row, channel: indices.
+        num_basis: number of entries that the material needs.
         factors, step: written, w_k p_k in the row and the difference to the next. (entries,)
     Returns:
         The albedo in the row, and the difference to the next.
     """
     albedo = albedo_step = np.float32(0)
-    lobe, num_basis = lobes.lobe_index[material], factors.shape[0]
+    lobe = lobes.lobe_index[material]
     for basis_index in range(num_basis):
         factors[basis_index] = step[basis_index] = 0
     for group in range(tables.table_index.shape[1]):
@@ -68,23 +75,20 @@ def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type:
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, step, view_coordinates):  # type: ignore[no-untyped-def]
+def _outgoing_with_derivatives(recurrence_table, incident, channel, num_basis, factors, step, fraction, rotation):  # type: ignore[no-untyped-def]
     """Sum the incident light of a probe with coefficients, and its derivatives.
 
     Args:
-        recurrence_table: recurrence table of the basis. incident: t of the probe. (3, K).
-        channel, factors, step: see `_sum_factors`.
-        view_coordinates: from `view_direction_local`.
+        recurrence_table: `recurrence_by_degree`. incident: t of the probe. (3, K).
+        channel, num_basis, factors, step: see `_sum_factors`.
+        fraction: toward the next row. rotation: from `powers_of_rotation`.
     Returns:
         Σ_k w_k p_k t_k; its derivative per row; and per radian of φo.
     """
-    _, fraction, cosine_phi, sine_phi = view_coordinates
     outgoing = row_derivative = azimuth_derivative = np.float32(0)
-    re, im = np.float32(1), np.float32(0)
-    for basis_index in range(factors.shape[0]):
+    for basis_index in range(num_basis):
         m = recurrence_table.order[basis_index]
-        if recurrence_table.a[basis_index] == 0 and m > 0:
-            re, im = re * cosine_phi - im * sine_phi, re * sine_phi + im * cosine_phi
+        re, im = rotation[0, m], rotation[1, m]
         factor = factors[basis_index] + fraction * step[basis_index]
         light = incident[channel, recurrence_table.cosine[basis_index]]
         if m > 0:
@@ -103,9 +107,11 @@ def _gradient(recurrence_table, frame, view_coordinates, non_environment, tables
     Args:
         frame: its normal, tangent and direction to the camera, unit, tuples. view_coordinates: from
             `view_direction_local`.
-        non_environment: t of it. (3, K). scratch: (2, entries)
+        non_environment: t of it. (3, K). scratch: (2, entries), (2, orders)
     """
-    (n, t, o), factors, step = frame, scratch[0], scratch[1]
+    (n, t, o), (factors, step), rotation = frame, scratch[0], scratch[1]
+    degree = tables.degree[material, _NON_ENVIRONMENT_COLUMN // 2]
+    num_basis = _NUM_ROWS[degree]
     row, fraction, cosine_phi, sine_phi = view_coordinates
     facing = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
     cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
@@ -114,12 +120,13 @@ def _gradient(recurrence_table, frame, view_coordinates, non_environment, tables
     rows_per_radian = np.float32(0.5 * (NUM_ROWS - 1)) * math.sqrt(np.float32(1) + cosine)
     if facing < MIN_COSINE:
         rows_per_radian = np.float32(0)
+    powers_of_rotation(cosine_phi, sine_phi, degree, rotation)
     by_theta = by_phi = np.float32(0)
     for channel in range(3):
-        albedo, albedo_step = _sum_factors(tables, lobes, material, row, channel, factors, step)
+        albedo, albedo_step = _sum_factors(tables, lobes, material, row, channel, num_basis, factors, step)
         albedo += fraction * albedo_step
         outgoing, row_derivative, azimuth_derivative = _outgoing_with_derivatives(
-            recurrence_table, non_environment, channel, factors, step, view_coordinates
+            recurrence_table, non_environment, channel, num_basis, factors, step, fraction, rotation
         )
         if outgoing > 0 and albedo > np.float32(1e-6):
             weight = _LUMINANCE[channel] / albedo
@@ -138,7 +145,7 @@ def _gradient(recurrence_table, frame, view_coordinates, non_environment, tables
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _gradients(recurrence_table, viewed, non_environment, tables, lobes, start, stop, scratch, out):  # type: ignore[no-untyped-def]
-    """Compute G and G · ω_p of probes rows[start:stop]. scratch: (2, entries). out: (probes, 4), written there"""
+    """Compute G and G · ω_p of probes rows[start:stop]. scratch: (2, entries), (2, orders). out: (probes, 4)"""
     material, normal, tangent = viewed.material, viewed.points.normal, viewed.points.tangent
     for p in viewed.rows[start:stop]:
         out[p, 0] = out[p, 1] = out[p, 2] = out[p, 3] = 0
@@ -175,10 +182,11 @@ def gradients_along_lobe(
         G in world space, and G · ω_p, radiance.
     """
     gradients = np.zeros((len(non_environment), 4), np.float32) if out is None else out
-    args = recurrence(), viewed, non_environment, tables, lobes
+    args = recurrence_by_degree(), viewed, non_environment, tables, lobes
 
     def compute(start: int, stop: int) -> None:
-        _gradients(*args, start, stop, np.empty((2, len(args[0].order)), np.float32), gradients)
+        scratch = np.empty((2, len(args[0].order)), np.float32), np.empty((2, DEGREE + 1), np.float32)
+        _gradients(*args, start, stop, scratch, gradients)
 
     parallel_for_chunks(compute, len(viewed.rows))
     return gradients
