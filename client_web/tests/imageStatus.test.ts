@@ -32,10 +32,7 @@ test("between the stages of an exact image nothing else is said", () => {
   isFrameExact.value = true;
   vi.advanceTimersByTime(1000);
   stop();
-  expect(texts.slice(1, 3)).toEqual([
-    "Updating exact direct light…",
-    "Updating the exact image of this camera…",
-  ]);
+  expect(texts.slice(1, 3)).toEqual(["Updating exact direct light…", "Updating the exact image of this camera…"]);
   expect(texts.slice(3)).toEqual([expect.stringMatching(/^Exact/)]);
 });
 

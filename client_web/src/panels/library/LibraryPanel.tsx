@@ -107,7 +107,9 @@ export function LibraryPanel() {
         </div>
       )}
       {visibleEntries.value.length === 0 && query.value === "" && model.value === MEASURED && (
-        <p class="library-help">No measurements yet. Import a MERL (.binary), RGL (.bsdf) or Cornell (.brdf) file to edit its curves.</p>
+        <p class="library-help">
+          No measurements yet. Import a MERL (.binary), RGL (.bsdf) or Cornell (.brdf) file to edit its curves.
+        </p>
       )}
       {visibleEntries.value.length === 0 && query.value === "" && model.value === BTFS && (
         <p class="library-help">
