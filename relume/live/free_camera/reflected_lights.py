@@ -65,14 +65,16 @@ def add_reflected_lights(lights, gain, surfaces, paths, entry, out):  # type: ig
     to_half = _ONE if surfaces.is_half_angle[lobe] else _TWO
     spread = _HALF * to_half * _SIDE_MEDIAN * paths.spread[entry]
     for k in range(lights.shape[0]):
-        hx, hy, hz = lights[k, 0] + o[0], lights[k, 1] + o[1], lights[k, 2] + o[2]
-        length = np.float32(math.sqrt(hx * hx + hy * hy + hz * hz)) + np.float32(1e-6)
-        if n[0] * lights[k, 0] + n[1] * lights[k, 1] + n[2] * lights[k, 2] <= 0:
+        x, y, z = lights[k, 0], lights[k, 1], lights[k, 2]
+        along = n[0] * x + n[1] * y + n[2] * z
+        if along <= 0:
             continue
+        hx, hy, hz = x + o[0], y + o[1], z + o[2]
+        length = np.float32(math.sqrt(hx * hx + hy * hy + hz * hz)) + np.float32(1e-6)
         angle, per_direction = acos_clamped((n[0] * hx + n[1] * hy + n[2] * hz) / length), _HALF / length
         if not surfaces.is_half_angle[lobe]:
-            # twice the half angle is near the angle to the mirror direction
-            angle, per_direction = _TWO * angle, _ONE
+            facing = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+            angle, per_direction = acos_clamped(_TWO * facing * along - (x * o[0] + y * o[1] + z * o[2])), _ONE
         radius = to_half * disk_radius(lights[k, 6])
         stretch = np.float32(math.sqrt(_ONE + (_EIGHTH * radius * radius + spread * spread) / (median * median)))
         density = tabulated_density(surfaces.quantile, lobe, angle / stretch) * per_direction / (stretch * stretch)
