@@ -42,6 +42,7 @@ END, ESCAPE, REFLECTION, TRANSMISSION = np.uint8(0), np.uint8(1), np.uint8(2), n
 """Kinds of entries in `LobePaths`."""
 
 _HALF, _ONE = np.float32(0.5), np.float32(1)
+_SHORTEST = 1e-9  # edge, meters
 
 
 class LobePaths(NamedTuple):
@@ -50,8 +51,8 @@ class LobePaths(NamedTuple):
     Attributes:
         first: begin of each point's entries. ray: index of the ray.
         kind: `END` at a patch, also for the light that glass on the path reflects itself; `ESCAPE` from the scene,
-            `TRANSMISSION` if through glass alone; or `REFLECTION`, stored for wide lobes, which the peaks of the
-            environment light directly.
+            `TRANSMISSION` if through glass alone; or `REFLECTION`, stored for lobes with a blur, which the brightest
+            parts of the environment light directly.
         patch: patch of the end or reflection, `NO_PATCH` for none. lobe: row in `LobeSurfaces` of the newest lobe.
         texture: at the end, see `relume.transport.hit_textures`.
         emitter: material of the end if it may emit light to this side after a reflection, else `NO_EMITTER`: the
@@ -59,6 +60,7 @@ class LobePaths(NamedTuple):
         throughput: product of the albedos and transmittances so far.
         direction: of the newest ray; of a reflection its wo, world space.
         normal: of a reflection.
+        spread: angle between the mirror directions of neighboring rays at a reflection, radians.
     """
 
     first: Shaped[NDArray[np.int64], " ends"]
@@ -72,6 +74,7 @@ class LobePaths(NamedTuple):
     throughput: Shaped[F32, "K 3"]
     direction: Shaped[F32, "K 3"]
     normal: Shaped[F32, "K 3"]
+    spread: Shaped[F32, " K"]
 
     @classmethod
     def allocate(cls, num_points: int, num_entries: int, num_slots: int) -> LobePaths:
@@ -86,8 +89,8 @@ class LobePaths(NamedTuple):
         )
         vectors = np.empty((3, num_entries, 3), np.float32)
         texture, emission = np.empty((num_entries, num_slots), np.uint32), np.empty(num_entries, np.uint32)
-        first = np.zeros(num_points + 1, np.int64)
-        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, *vectors)
+        first, spread = np.zeros(num_points + 1, np.int64), np.empty(num_entries, np.float32)
+        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, *vectors, spread)
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
         """Select the paths of some points."""
@@ -108,10 +111,12 @@ class LobeSurfaces(NamedTuple):
     Attributes:
         faces: corners of the triangles. face_material: their materials.
         normals: of the corners; empty if only those of the triangles are known.
+        curvature: largest change of the normal along an edge of each triangle, per meter.
         lobe: row of each material in the following arrays, −1 if rays end there.
         quantile, band_density, is_half_angle, scale: as in `LobePattern`, at one level.
         albedo: directional albedo at equal steps of cos θo from 0 to 1.
-        blur: angle over which the environment is averaged behind a wide lobe, radians; zero for others.
+        blur: angle over which the environment is averaged behind a wide lobe, radians; zero for others. See
+            `LobePaths.kind`.
         tint: mean of the specular texture of each patch, for a store without textures; ones in row `NO_PATCH`.
         textures: of all surfaces. specular: row of the specular texture among those of a hit, −1 for none.
         glass: transmittance of each material for red, green and blue without reflectance, −1 if it is opaque, and the
@@ -123,6 +128,7 @@ class LobeSurfaces(NamedTuple):
     faces: Shaped[NDArray[np.uint32], "faces 3"]
     face_material: Shaped[NDArray[np.int32], " faces"]
     normals: Shaped[F32, "corners 3"]
+    curvature: Shaped[F32, " faces"]
     lobe: Shaped[NDArray[np.int32], " materials"]
     quantile: Shaped[F32, "S quantiles"]
     band_density: Shaped[F32, "S bands"]
@@ -147,6 +153,7 @@ NO_SURFACES = LobeSurfaces(
     faces=np.empty((0, 3), np.uint32),
     face_material=np.empty(0, np.int32),
     normals=np.empty((0, 3), np.float32),
+    curvature=np.empty(0, np.float32),
     lobe=np.empty(0, np.int32),
     quantile=np.empty((0, 0), np.float32),
     band_density=np.empty((0, 0), np.float32),
@@ -162,6 +169,16 @@ NO_SURFACES = LobeSurfaces(
     offset=0.0,
 )
 """Of a scene in which all rays end at the first surface."""
+
+
+def edge_curvature(positions: Shaped[F32, "faces 3 3"], normals: Shaped[F32, "faces 3 3"]) -> Shaped[F32, " faces"]:
+    """Return the largest change of the normal along an edge of each triangle, per meter.
+
+    Args:
+        positions, normals: of the corners.
+    """
+    length, change = (np.linalg.norm(each - np.roll(each, 1, axis=1), axis=2) for each in (positions, normals))
+    return np.asarray((change / np.maximum(length, _SHORTEST)).max(axis=1), np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
@@ -242,7 +259,7 @@ def _transmit(packet, k, material, face_normal, surfaces, throughput):  # type: 
 def _store(paths, entry, point, ray, kind, patch, lanes, k, direction):  # type: ignore[no-untyped-def]
     """Write an entry of paths, with the point in `first`; the rest is that of lane k."""
     paths.first[entry], paths.ray[entry], paths.kind[entry], paths.patch[entry] = point, ray, kind, patch
-    paths.lobe[entry] = lanes.lobe[k]
+    paths.lobe[entry], paths.spread[entry] = lanes.lobe[k], lanes.angle[k]
     is_lit = kind == END and lanes.lobe[k] >= 0
     paths.emitter[entry], paths.emission[entry] = lanes.emitter[k] if is_lit else NO_EMITTER, lanes.emission[k]
     for row in range(paths.texture.shape[1]):
@@ -261,13 +278,12 @@ def look_up_hits(packet, ray, lookup, surfaces, lanes):  # type: ignore[no-untyp
         lanes: `RayLanes`; its distances grow by those of the rays.
     """
     locate_smoothly(packet, ray, lookup, lanes)
-    if surfaces.textures.slots.shape[0] == 0:
-        return
     for k in range(LANES):
         face, distance = get_hit(packet, k)
         if packet.is_active[k] != 0 and face >= 0:
             lanes.distance[k] += distance
-    look_up_textures(packet, surfaces.textures, surfaces.face_material, lanes)
+    if surfaces.textures.slots.shape[0] > 0:
+        look_up_textures(packet, surfaces.textures, surfaces.face_material, lanes)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
@@ -315,7 +331,7 @@ def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, 
     last, lobes, throughput, has_escaped = lanes.last, lanes.lobe, lanes.throughput, lanes.has_escaped
     for k in range(LANES):
         lobes[k], has_escaped[k], last[k] = -1, False, lanes.patches[k]
-        lanes.num_reflections[k], lanes.is_path[k] = 0, False
+        lanes.num_reflections[k], lanes.is_path[k], lanes.angle[k] = 0, False, lanes.spread[k]
         throughput[0, k] = throughput[1, k] = throughput[2, k] = _ONE
     for _ in range(MAX_REFLECTIONS + _MAX_SIDES):
         num_active = 0
@@ -335,6 +351,7 @@ def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, 
                 for channel in range(3):
                     throughput[channel, k] *= tint[channel]
                 lanes.num_reflections[k] += 1
+                lanes.angle[k] += np.float32(2) * surfaces.curvature[face] * lanes.spread[k] * lanes.distance[k]
                 random = ray_jitter(ray + lanes.num_reflections[k] * num_rays, lanes.seeds[k])
                 goes_on = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput, lanes.normal)
                 lobes[k], last[k], lanes.is_path[k], lanes.emitter[k] = lobe, NO_PATCH, True, NO_EMITTER

@@ -54,6 +54,7 @@ class RayLanes(NamedTuple):
         throughput: as in `LobePaths`. normal: of the newest reflection. has_escaped: whether the ray left the scene.
         num_reflections: so far. is_path: whether the ray went on from its first hit.
         spread: width of a ray's footprint by the length of its path. distance: this length, meters.
+        angle: between the directions of neighboring rays, after reflections of curved surfaces, radians.
         texture: of the newest hit, see `relume.transport.hit_textures`. texel: memory for a lookup.
         emitter, emission: of the newest hit, as in `LobePaths`.
     """
@@ -71,6 +72,7 @@ class RayLanes(NamedTuple):
     is_path: Shaped[NDArray[np.bool_], " lanes"]
     spread: Shaped[F32, " lanes"]
     distance: Shaped[F32, " lanes"]
+    angle: Shaped[F32, " lanes"]
     texture: Shaped[NDArray[np.uint32], "slots lanes"]
     texel: Shaped[F32, " 3"]
     emitter: Shaped[NDArray[np.uint16], " lanes"]
@@ -85,7 +87,7 @@ def allocate_lanes():  # type: ignore[no-untyped-def]
         np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros(LANES, np.int32),
         np.zeros((3, LANES), np.float32), np.zeros((3, LANES), np.float32), np.zeros(LANES, np.bool_),
         np.zeros(LANES, np.int32), np.zeros(LANES, np.bool_), np.zeros(LANES, np.float32), np.zeros(LANES, np.float32),
-        np.zeros((_MAX_SLOTS, LANES), np.uint32), np.zeros(3, np.float32),
+        np.zeros(LANES, np.float32), np.zeros((_MAX_SLOTS, LANES), np.uint32), np.zeros(3, np.float32),
         np.zeros(LANES, np.uint16), np.zeros(LANES, np.uint32),
     )  # fmt: skip
 

@@ -89,7 +89,7 @@ def test_rays_meet_what_single_rays_meet(geometry, lookup, points):
     assert len(hits.paths.ray) == 0
 
 
-def polished_ceiling(blur=0.0):
+def polished_ceiling(blur=0.0, curvature=0.0):
     lobe = sample_lobe(CHROME, NO_LEVELS)
     tint = np.ones((NO_PATCH + 1, 3), np.float32)
     tint[9] = 1, 0.5, 0.25
@@ -97,6 +97,7 @@ def polished_ceiling(blur=0.0):
         faces=np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]], np.uint32),
         face_material=np.array([0, 0, 1, 1], np.int32),
         normals=np.empty((0, 3), np.float32),
+        curvature=np.full(4, curvature, np.float32),
         lobe=np.array([-1, 0], np.int32),
         quantile=lobe.quantile,
         band_density=lobe.band_density,
@@ -141,6 +142,18 @@ def test_wide_lobes_store_where_they_are_lit(geometry, lookup, points):
     assert np.count_nonzero(lit) == np.count_nonzero(~lit)
     assert set(paths.patch[lit]) == {9}
     np.testing.assert_allclose(paths.normal[lit], [[0, -1, 0]] * np.count_nonzero(lit), atol=1e-6)
+
+
+def test_beams_spread_where_they_meet_a_curved_surface(geometry, lookup, points):
+    pattern, spread = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7), {}
+    for curvature in (0.0, 3.0):
+        surfaces = polished_ceiling(0.1, curvature)
+        paths = trace_lobe_rays(geometry, lookup, surfaces, *points, NO_FOOTPRINT, None, pattern).paths
+        lit = paths.kind == REFLECTION
+        spread[curvature], distance = paths.spread[lit], 1 / np.abs(paths.direction[lit, 1])
+    assert np.ptp(spread[0.0]) == 0
+    assert spread[0.0][0] > 0
+    np.testing.assert_allclose(spread[3.0] / spread[0.0], 1 + 2 * 3 * distance, rtol=0.01)
 
 
 def test_selected_points_keep_their_paths(geometry, lookup, points):

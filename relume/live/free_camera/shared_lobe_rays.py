@@ -36,7 +36,7 @@ MAX_RAYS = 60_000
 
 _MOST_RAYS = 8  # of a point
 _SEED = 1
-_SPLITS = SplitLimits(128, 384)  # points whose highlights are averaged over their pixels
+_SPLITS = SplitLimits(128, 384)  # points whose reflections are averaged over their pixels
 _STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads points evenly
 _REACH, _MAX_REACH = 2, 32  # pixels from which rays are shared, and where there are none nearer
 _BLOCK = 16  # pixels along each side: the first point in each block has rays, so that small pieces have some in reach
@@ -222,32 +222,31 @@ def lobe_radiance(
     share = max(rays_per_point, _LEAST_POINTS / max(image.num_pixels, 1)) if is_image else 1.0
     rows = np.flatnonzero(image.order < share)
     points, sides = (receivers.without_light(rows), footprint[rows]) if is_image else (receivers, footprint)
-    radiance = mean_lobe_radiance(*light_args, points, sides, core, lobe_width, is_direct=is_direct)
+    ray_args, options = (core, lobe.blur), {"is_direct": is_direct}
+    radiance = mean_lobe_radiance(*light_args, points, sides, *ray_args, **options)
     if is_image:
         radiance = _share_with_neighbors(radiance, rows, image, receivers, footprint, lobe_width)
     if is_direct:
-        direct = np.zeros_like(radiance)
-        emitter_args = pattern, emitters
-        add_direct_lights(*light_args, receivers, footprint, *emitter_args, direct)
-        if image.source is not None and len(scene.surfaces.normals):
-            split = _split_points(scene, receivers, image, image.source, direct)
-            of_points, no_visibility = np.zeros_like(split.wo), np.empty((len(split.wo), 0), np.uint8)
-            points = ShadingPoints(split.points, split.wo, no_visibility)
-            add_direct_lights(*light_args, points, NO_FOOTPRINT, *emitter_args, of_points)
-            split.average(of_points, direct)
-        radiance += direct
+        add_direct_lights(*light_args, receivers, footprint, pattern, emitters, radiance)
+    if image.source is not None and len(scene.surfaces.normals):
+        split = _split_points(scene, receivers, image, image.source, radiance)
+        points = ShadingPoints(split.points, split.wo, np.empty((len(split.wo), 0), np.uint8))
+        of_points = mean_lobe_radiance(*light_args, points, NO_FOOTPRINT, *ray_args, **options)
+        if is_direct:
+            add_direct_lights(*light_args, points, NO_FOOTPRINT, pattern, emitters, of_points)
+        split.average(of_points, radiance)
     return radiance
 
 
 def _split_points(
-    scene: LobeScene, receivers: ShadingPoints, image: ImagePoints, source: PixelSource, direct: Shaped[F32, "n 3"]
+    scene: LobeScene, receivers: ShadingPoints, image: ImagePoints, source: PixelSource, radiance: Shaped[F32, "n 3"]
 ) -> PixelPoints:
-    """Return points all over the pixels in which highlights may vary most, with the rows that they are of.
+    """Return points all over the pixels in which reflections may vary most, with the rows that they are of.
 
     Args:
-        scene, receivers, image: as in `lobe_radiance`. source: of `image`. direct: light of the highlights.
+        scene, receivers, image: as in `lobe_radiance`. source: of `image`. radiance: L̄ of each.
     """
-    rows, side = choose_splits(image.pixel, image.size, direct, _SPLITS)
+    rows, side = choose_splits(image.pixel, image.size, radiance, _SPLITS)
     geometry = with_normals(scene.geometry, scene.surfaces.normals)
     pixel = image.pixel[rows].astype(np.int64)
     pixel_args = pixel, side, receivers.tangent[rows], source.material

@@ -40,7 +40,7 @@ from relume.raytrace.surface_textures import (
 from relume.store.bake_protocol import StoreReader
 from relume.transport.hit_textures import NO_TEXTURES, HitTextures, hit_textures, row_of_slot, textured_light
 from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
-from relume.transport.lobe_paths import LobeSurfaces
+from relume.transport.lobe_paths import LobeSurfaces, edge_curvature
 from relume.transport.lobe_rays import NO_EMISSION, LobeEnvironment
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
@@ -152,6 +152,7 @@ class LobeTracer:
             faces=geometry.faces,
             face_material=geometry.face_material,
             normals=self.normals,
+            curvature=self._curvature,
             lobe=row,
             quantile=quantile,
             band_density=band_density,
@@ -212,6 +213,14 @@ class LobeTracer:
             raise
         except StoreError:
             return np.empty((0, 3), np.float32)
+
+    @cached_property
+    def _curvature(self) -> Shaped[F32, " faces"]:
+        """Curvature of all triangles, see `LobeSurfaces`."""
+        geometry = self._tracer.geometry
+        if not len(self.normals):
+            return np.zeros(len(geometry.faces), np.float32)
+        return edge_curvature(geometry.positions[geometry.faces], self.normals[geometry.faces])
 
     @cached_property
     def _lookup(self) -> PatchLookup:
