@@ -260,11 +260,8 @@ class FreeCameraPicture:
         return self._is_watched and not self._probe_light.is_available(self._light_request())
 
     def _light_request(self) -> LightRequest:
-        """Return the light request; hard shadows per pixel are not available in the browser's renderer or on BTFs."""
-        assert self._look is not None
-        return LightRequest(
-            self._current_light(), self.renders_pixels and not any(self._material_state(self._look).btf_materials)
-        )
+        """Return the light request; hard shadows per pixel are not available in the browser's renderer."""
+        return LightRequest(self._current_light(), self.renders_pixels)
 
     @property
     def _needed_probes(self) -> NDArray[np.uint8]:

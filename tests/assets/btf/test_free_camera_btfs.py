@@ -20,7 +20,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import (
     find_btf_materials,
     pack_lanes,
 )
-from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight
+from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight, TexelSource
 from relume.look import validate
 from relume.math.zernike import basis_functions, recurrence
 from relume.output.render_image import render_image
@@ -82,7 +82,7 @@ def terms_of(look_of):
 
 
 def incident_light(surface):
-    return IncidentTexelLight(vectors_of(surface, TO_LIGHT), TexelLight())
+    return IncidentTexelLight([TexelSource(vectors_of(surface, TO_LIGHT))], TexelLight())
 
 
 def factors(numbers, axes):
@@ -140,8 +140,8 @@ def test_light_around_a_node_equals_the_reference(free_bake):
     surface = replace(surface, probes=surface.probes._replace(tangent=tangent))
     vectors = rng.normal(size=free_bake.vectors_shape).astype(np.float32)
     light, num = TexelLight(), len(surface.lattice_nodes.normal)
-    light.around_nodes(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
-    actual = light.around_nodes(surface, vectors, np.ones(num, np.uint8))
+    light.around_nodes(surface, [TexelSource(vectors)], np.arange(num, dtype=np.uint8) % 2)
+    actual = light.around_nodes(surface, [TexelSource(vectors)], np.ones(num, np.uint8))
     for vertex in range(0, len(actual.tangent), 37):
         expected, along = node_light_numpy(surface.lattice_nodes, tangent, vectors, vertex)
         np.testing.assert_allclose(
@@ -161,8 +161,29 @@ def test_changed_light_is_not_taken_from_the_cache(free_bake):
         np.ones(len(free_bake.stored_scene.lattice_nodes.normal), np.uint8),
     )
     dark, bright = np.zeros(free_bake.vectors_shape, np.float32), np.ones(free_bake.vectors_shape, np.float32)
-    assert light.around_nodes(surface, bright, every).vectors.any()
-    assert not light.around_nodes(surface, dark, every).vectors.any()
+    assert light.around_nodes(surface, [TexelSource(bright)], every).vectors.any()
+    assert not light.around_nodes(surface, [TexelSource(dark)], every).vectors.any()
+    assert not light.around_nodes(surface, [TexelSource(bright, (0.0, 0.0, 0.0))], every).vectors.any()
+
+
+def test_texels_show_the_visible_fraction_of_each_hard_shadow_light(free_bake, small_btf):
+    """The result is linear in the visible fractions, also for rays of one pixel on both sides of a shadow's edge."""
+    covers = find_btf_materials(terms_of(covered(free_bake, small_btf.record, scale=SCALE))).available
+    surface, view = free_bake.stored_scene, sight(free_bake)
+    vectors, gain = vectors_of(surface, TO_LIGHT), (0.5, 1.0, 2.0)
+    fractions = np.random.default_rng(3).random((2, len(view.gbuffer.directions))).astype(np.float32)
+
+    def relief(*sources):
+        out = np.full((len(view.gbuffer.directions), 3), 1e2, np.float32)
+        shade_texels(covers, surface, free_bake.positions, view, IncidentTexelLight(sources, TexelLight()), out)
+        return out - 1e2
+
+    dark = TexelSource(np.zeros_like(vectors))
+    whole = relief(TexelSource(vectors, gain), TexelSource(vectors, gain, np.zeros_like(fractions[0])))
+    actual = relief(dark, *(TexelSource(vectors, gain, each) for each in fractions))
+    centers = slice(len(view.gbuffer.directions) - len(view.gbuffer.owner))
+    np.testing.assert_allclose(actual[centers], fractions.sum(axis=0)[centers, None] * whole[centers], atol=2e-4)
+    assert np.abs(whole[centers]).max() > 0.01
 
 
 def test_compressed_outgoing_coefficients_are_accurate(free_bake, small_btf):

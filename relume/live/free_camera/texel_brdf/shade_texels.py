@@ -1,9 +1,10 @@
 """Per-texel BTF shading: the difference between a texel and the mean texel, under the light at the point.
 
-    B(pixel) = B̄ + C Σ_k (p_k(ωo, x) − p̄_k(ωo)) t_k
+    B(pixel) = B̄ + C Σ_k (p_k(ωo, x) − p̄_k(ωo)) (t_k + Σ_l V_l(pixel) u_lk)
 
-B̄ is the radiance reflected by the mean texel, computed like other materials; C is the term's color and gain. In static
-views each texel is summed over all lights (`relume.transport.btf_kernel`).
+B̄ is the radiance reflected by the mean texel, computed like other materials, hard shadows included; C is the term's
+color and gain; V_l and u_l are the visibility and the unoccluded light of a hard-shadow light. In static views each
+texel is summed over all lights (`relume.transport.btf_kernel`).
 """
 
 from __future__ import annotations
@@ -43,7 +44,11 @@ from relume.live.free_camera.texel_brdf.texture_coordinates import (
     map_to_texture,
     vector_row,
 )
-from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight, rotation_from_vector
+from relume.live.free_camera.texel_brdf.texture_frame_light import (
+    TexelLight,
+    TexelSource,
+    rotation_from_vector,
+)
 from relume.probes.stored_scene import StoredScene
 from relume.transport.btf_kernel import texels_at_level
 
@@ -69,11 +74,17 @@ class IncidentTexelLight(NamedTuple):
     """Incident radiance, and what is derived from it.
 
     Attributes:
-        vectors: coefficients at probes. light: at lattice nodes, cached from frame to frame.
+        sources: that of the probes, then hard-shadow lights. light: at lattice nodes, cached from frame to frame.
     """
 
-    vectors: Shaped[F32, "probes 3 functions"]
+    sources: Sequence[TexelSource]
     light: TexelLight
+
+    @property
+    def shadow_visibility(self) -> Shaped[F32, "lights rays"]:
+        """Visible fractions of the hard-shadow lights."""
+        fractions = [source.visibility for source in self.sources if source.visibility is not None]
+        return np.stack(fractions) if fractions else np.empty((0, 0), np.float32)
 
 
 class _PlacedBtf(NamedTuple):
@@ -143,18 +154,24 @@ def _list_rays(face, face_material, has_btf, reuses_center, lattice_node, first,
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _subtract_center(gbuffer, num_pixels, has_btf, face_material, face_normal, reuses_center, out):  # type: ignore[no-untyped-def]
-    """Find edge rays that hit the same surface as the pixel center, and subtract the center's radiance from theirs.
+def _subtract_center(gbuffer, shadow_visibility, has_btf, surface, num_pixels, reuses_center, out):  # type: ignore[no-untyped-def]
+    """Find edge rays that hit the same surface as the pixel center, in the same hard-shadow lights, and subtract the
+    center's radiance from theirs.
 
     Args:
-        gbuffer: of the rays. reuses_center: per ray, written. out: radiance by the mean texel, written. (rays, 3)
+        gbuffer: of the rays. shadow_visibility: of hard-shadow lights. (lights, rays). surface: material and normal of
+            each face. reuses_center: per ray, written. out: radiance by the mean texel, written. (rays, 3)
     """
+    face_material, face_normal = surface
     for k in range(gbuffer.owner.shape[0]):
         ray, p = num_pixels + k, gbuffer.owner[k]
         f = gbuffer.hits.face[ray]
         if f < 0 or not has_btf[face_material[f]]:
             continue
-        if not is_edge(face_material, face_normal, gbuffer.hits, gbuffer.directions, p, ray):
+        is_same = not is_edge(face_material, face_normal, gbuffer.hits, gbuffer.directions, p, ray)
+        for light in range(shadow_visibility.shape[0]):
+            is_same = is_same and shadow_visibility[light, ray] == shadow_visibility[light, p]
+        if is_same:
             reuses_center[ray] = 1
             for channel in range(3):
                 out[ray, channel] -= out[p, channel]
@@ -187,13 +204,11 @@ def _fetch_texels(levels, direction_grid, weights, num_rays, scratch):  # type: 
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, nodes, weights, x, y, side):  # type: ignore[no-untyped-def]
-    """Integrate a texel's coefficients with the light interpolated between three lattice nodes, per channel.
+def _node_rotations(tangents, nodes, x, y):  # type: ignore[no-untyped-def]
+    """Cosine and sine of the rotation from each of three lattice nodes to the texture's frame, a tuple of six.
 
     Args:
-        coefficients, axes, secondary_axes, vectors, nodes, weights, side: coefficients, axes, secondary axes, vectors,
-            nodes, weights and side of `integrate`. tangents: tangents of nodes.
-        x, y: axes of the texture, tuples.
+        tangents: of all nodes. nodes: the three. x, y: axes of the texture, tuples.
     """
     t, u, v = vector_row(tangents, nodes[0]), vector_row(tangents, nodes[1]), vector_row(tangents, nodes[2])
     rotation_t, rotation_u, rotation_v = (
@@ -201,13 +216,21 @@ def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, node
         rotation_from_vector(dot(u, x), dot(u, y)),
         rotation_from_vector(dot(v, x), dot(v, y)),
     )
-    rotations = rotation_t[0], rotation_t[1], rotation_u[0], rotation_u[1], rotation_v[0], rotation_v[1]
-    return integrate(coefficients, axes, secondary_axes, vectors, nodes, weights, rotations, side)
+    return rotation_t[0], rotation_t[1], rotation_u[0], rotation_u[1], rotation_v[0], rotation_v[1]
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _source_nodes(nodes, source, num_nodes):  # type: ignore[no-untyped-def]
+    """Rows of `NodeLight.vectors` of three nodes for a source."""
+    first = np.uint32(source * num_nodes)
+    return np.uint32(nodes[0] + first), np.uint32(nodes[1] + first), np.uint32(nodes[2] + first)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _shade_texels(btf, footprint, placements, normals, light, rows, start, stop, scratch, out):  # type: ignore[no-untyped-def]
-    """Shade rays rows[start:stop]. btf: `_PlacedBtf`. out: (rays, 3)"""
+def _shade_texels(  # type: ignore[no-untyped-def]
+    btf, footprint, placements, normals, light, shadow_visibility, rows, start, stop, scratch, out
+):
+    """Shade rays rows[start:stop]. btf: `_PlacedBtf`. shadow_visibility: (lights, rays). out: (rays, 3)"""
     camera_position, pixel_angle, gbuffer = footprint
     (levels, weights, step, axes), color, (tangents, vectors) = btf.tables, btf.color, light
     lattice_node, weight, columns, coefficients = (
@@ -232,12 +255,22 @@ def _shade_texels(btf, footprint, placements, normals, light, rows, start, stop,
             nodes = lattice_node[ray, 0], lattice_node[ray, 1], lattice_node[ray, 2]
             node_weights = weight[ray, 0], weight[ray, 1], weight[ray, 2]
             x, y, side = get_vector(columns, X, j), get_vector(columns, Y, j), columns[SIDE + j]
-            texel_term = _integrate_nodes(
-                coefficients, axes, btf.secondary_axes, tangents, vectors, nodes, node_weights, x, y, side
-            )
-            out[ray, 0] = max(out[ray, 0] + color[0] * texel_term[0], F(0))
-            out[ray, 1] = max(out[ray, 1] + color[1] * texel_term[1], F(0))
-            out[ray, 2] = max(out[ray, 2] + color[2] * texel_term[2], F(0))
+            node_rotations = _node_rotations(tangents, nodes, x, y)
+            red, green, blue = out[ray, 0], out[ray, 1], out[ray, 2]
+            for source in range(1 + shadow_visibility.shape[0]):
+                visible = F(1) if source == 0 else shadow_visibility[source - 1, ray]
+                if visible > 0:
+                    radiance = integrate(
+                        coefficients, axes, btf.secondary_axes, vectors, _source_nodes(nodes, source, tangents.shape[0]),
+                        (visible * node_weights[0], visible * node_weights[1], visible * node_weights[2]),
+                        node_rotations, side,
+                    )  # fmt: skip
+                    red, green, blue = (
+                        red + color[0] * radiance[0],
+                        green + color[1] * radiance[1],
+                        blue + color[2] * radiance[2],
+                    )
+            out[ray, 0], out[ray, 1], out[ray, 2] = max(red, F(0)), max(green, F(0)), max(blue, F(0))
 
 
 def shade_texels(
@@ -255,7 +288,8 @@ def shade_texels(
     Args:
         btf_materials: BTF materials of the look. stored_scene: that is hit.
         positions: positions of triangle corners, meters.
-        footprint: footprint of the camera. incident: at its probes. out: radiance along the rays, written.
+        footprint: footprint of the camera. incident: at its probes.
+        out: radiance by the mean texel along the rays, hard-shadow lights included, written.
     """
     if not btf_materials:
         return
@@ -268,15 +302,15 @@ def shade_texels(
     first, rows = np.empty(len(has_btf) + 1, np.int64), np.empty(len(face), np.int32)
     is_requested, reuses_center = np.zeros(len(gbuffer.is_visible), np.uint8), np.zeros(len(face), np.uint8)
     num_pixels = len(face) - len(gbuffer.owner) - len(gbuffer.glass.ray)
-    surface_args = has_btf, stored_scene.face_material, stored_scene.face_normal
-    _subtract_center(gbuffer, num_pixels, *surface_args, reuses_center, out)
+    surface, shadow_visibility = (stored_scene.face_material, stored_scene.face_normal), incident.shadow_visibility
+    _subtract_center(gbuffer, shadow_visibility, has_btf, surface, num_pixels, reuses_center, out)
     _list_rays(
         face, stored_scene.face_material, has_btf, reuses_center, gbuffer.lattice_node, first, rows, is_requested
     )
-    light = incident.light.around_nodes(stored_scene, incident.vectors, is_requested)
+    light = incident.light.around_nodes(stored_scene, incident.sources, is_requested)
     placements = incident.light.texture_placements(stored_scene, positions)
     kernel_footprint = footprint._replace(pixel_angle=np.float32(footprint.pixel_angle))
-    args = kernel_footprint, placements, stored_scene.lattice_nodes.normal, light, rows
+    args = kernel_footprint, placements, stored_scene.lattice_nodes.normal, light, shadow_visibility, rows
     spans = [
         (
             int(first[btf_material.material]),
