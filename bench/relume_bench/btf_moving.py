@@ -50,14 +50,11 @@ def measure(tiny: bool) -> list[Figure]:
         tempfile.TemporaryDirectory() as folder,
         STORE.with_search_folder(Path(folder) / "btfs"),
     ):
+        folder_path = Path(folder)
+        records = {name: SyntheticBtf(name, values_folder, tiny).save(folder_path, _BOUND) for name in names}
         comparisons = {
-            (name, sky): against_geometry(
-                SyntheticBtf(name, values_folder, tiny).save(Path(folder), _BOUND),
-                make(),
-                Path(folder) / f"{name}-{sky}",
-                tiny,
-            )
-            for name in names
+            (name, sky): against_geometry(record, make(), folder_path / f"{name}-{sky}", tiny)
+            for name, record in records.items()
             for sky, make in _SKIES.items()
         }
     return [_figure(comparisons)]

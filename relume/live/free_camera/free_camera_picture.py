@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.assets.btf.btf_memory import check_btfs_fit
 from relume.core.errors import ParameterError, ResultUnavailableError
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, check_exists, parse_pointer
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -101,7 +102,12 @@ class FreeCameraPicture:
         self._vectors_version = self._materials_version = 0
 
     def check(self, look: Look) -> None:
-        """Check that a look can be shown: always true, since tables represent any number of terms."""
+        """Check that a look can be shown: tables represent any number of terms, but BTFs may be too large together.
+
+        Raises:
+            MemoryBudgetError: its BTFs exceed the memory budget.
+        """
+        check_btfs_fit(term for material in look.materials.values() for term in material.terms)
 
     def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
         """Set a new target; nothing is computed yet.

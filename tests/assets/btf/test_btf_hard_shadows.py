@@ -43,15 +43,7 @@ def sunlit(bake, record=None, material="Floor"):
     document["transport"]["show"] = "direct"
     document["lights"] = {"Sun": SUN}
     if record is not None:
-        document["materials"][material]["terms"] = [
-            {
-                "model": "measured_btf",
-                "data": record.data,
-                "texture": None,
-                "color": [1.0] * 3,
-                "params": {"scale": 2.0},
-            }
-        ]
+        document["materials"][material]["terms"] = [{**record.terms()[0], "params": {"scale": 2.0}}]
     return validate(document, bake.default_look)
 
 

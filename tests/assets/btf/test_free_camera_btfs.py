@@ -4,15 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from btf_reference import parallax_intersection_numpy
 from numpy.typing import NDArray
 from test_fixed_camera_btfs import CAMERA, GRAY, SIZE, covered, floor, opened
 
 from relume.assets.btf.btf_store import load_btf
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
+from relume.assets.btf.parallax import compute_shears
 from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
+from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import (
     BtfMaterials,
@@ -93,22 +96,34 @@ def factors(numbers, axes):
     return out
 
 
+def seen_position_numpy(relief, side, uv, wo):
+    """Reference of `find_seen` at the finest level, in repeats."""
+    change = (wo[:2] / wo[2] - relief.shear[side]) * [1, -1]
+    (_, rows, columns), height = relief.levels[0], float(relief.lowest + 255 * relief.step)
+    for _ in range(NUM_FETCHES):
+        column, row = (np.floor((uv + height * change) * [columns, rows]) % [columns, rows]).astype(int)
+        height = float(relief.lowest + relief.step * relief.height[side, row * columns + column])
+    return uv + height * change
+
+
 def shade_ray_numpy(cover, d, position):
     """Reference of a ray on the floor, minus the mean, in plain NumPy; its texture's x is to the right, y away."""
     turn, tables = np.radians(ROTATION), cover.tables
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
-    axes, (height, width) = np.array([across, up, [0, 1, 0]]), cover.texels.btf.size
-    column, row = SCALE * np.array([width * across @ position, -height * up @ position]) - 0.5
-    numbers = np.zeros(tables.step.shape)
-    for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
-        number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
-        numbers += fraction * tables.step * tables.weight[:, number].astype(float)
+    axes, size = np.array([across, up, [0, 1, 0]]), np.array(cover.texels.btf.size[::-1])
+    wo, uv, total = -(axes @ d), SCALE * np.array([across @ position, -up @ position]), np.zeros(3)
     light = pack_lanes(basis_functions(axes @ TO_LIGHT))
-    view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, -(axes @ d)[None])
-
-    return np.einsum("a,ack,k->c", of_view[0], factors(numbers, tables.axes)[view[0]], light)
+    view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, wo[None])
+    for side, weight in zip(view[0], of_view[0], strict=True):
+        column, row = size * seen_position_numpy(tables.relief, side, uv, wo) - 0.5
+        numbers = np.zeros(tables.step.shape[1])
+        for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
+            number = int((np.floor(row) + down) % size[1] * size[0] + (np.floor(column) + beside) % size[0])
+            numbers += fraction * tables.step[side] * tables.weight[side, number].astype(float)
+        total += weight * factors(numbers, tables.axes) @ light
+    return total
 
 
 def test_the_free_camera_kernel_equals_the_reference(free_bake, small_btf):
@@ -227,6 +242,39 @@ def test_a_free_camera_equals_a_fixed_view(free_bake, small_btf, tmp_path, monke
     mean = render_image(free_bake, "front", look_of)
     size = np.linalg.norm(expected)
     assert np.linalg.norm(actual - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
+
+
+def test_view_directions_see_the_relief(small_btf):
+    """Seen heights at the centers of texels are those of rays, within half a step; coarser levels store their means."""
+    whole = load_btf(small_btf.record.data)
+    relief, shears = texel_tables.compute_texel_tables(whole).relief, compute_shears(whole.grid)
+    rows, columns = whole.size
+    seen = relief.lowest + relief.step * relief.height.astype(np.float64)
+    for view, texel in ((0, 5), (3, 100), (40, 77), (80, 200), (80, 13)):
+        center = (np.array([texel % columns, texel // columns]) + 0.5) / [columns, rows]
+        expected = parallax_intersection_numpy(whole.height, center, shears[view].astype(np.float64))
+        assert seen[view, texel] == pytest.approx(expected, abs=0.51 * float(relief.step) + 1e-5)
+    finest = seen[:, : rows * columns].reshape(len(shears), rows, columns)
+    means = 0.25 * sum(finest[:, a::2, b::2] for a in (0, 1) for b in (0, 1))
+    second = seen[:, rows * columns : rows * columns * 5 // 4].reshape(means.shape)
+    np.testing.assert_allclose(second, means, atol=1.01 * relief.step)
+
+
+def test_relief_is_found_between_view_directions(free_bake, small_btf, tmp_path, monkeypatch):
+    """As in fixed views, which follow each ray through the relief; without heights, relief is blurred."""
+    look_of = covered(free_bake, small_btf.record, scale=0.7)
+    expected = render_image(opened(floor(), tmp_path), "front", look_of)
+    with_relief = render_image(free_bake, "front", look_of)
+    whole = find_btf_materials(terms_of(look_of))
+    flat = [
+        cover._replace(
+            tables=cover.tables._replace(relief=cover.tables.relief._replace(step=np.float32(0), lowest=np.float32(0)))
+        )
+        for cover in whole.available
+    ]
+    monkeypatch.setattr(frame, "find_btf_materials", lambda *_, **__: BtfMaterials(flat, []))
+    without = render_image(free_bake, "front", look_of)
+    assert np.linalg.norm(with_relief - expected) < 0.7 * np.linalg.norm(without - expected)
 
 
 def test_a_btf_is_weighted_next_to_other_terms(free_bake, small_btf, tmp_path):

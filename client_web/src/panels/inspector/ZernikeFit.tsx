@@ -4,7 +4,6 @@ import type { ZernikeFitBody, Term } from "../../protocol";
 import { materialOf } from "../../state/scene";
 import { hasFreeCamera } from "../../state/views";
 import { isBtfTerm } from "../../state/look";
-import { isClientRendering } from "../../session/clientRendering";
 import { useServerQuery } from "./useServerQuery";
 
 function fitMessage({ functions, residual, required_functions, is_mirror }: ZernikeFitBody): string {
@@ -19,17 +18,11 @@ function fitMessage({ functions, residual, required_functions, is_mirror }: Zern
   return `While the camera moves: error ${percent} with ${functions} basis functions${enough}.`;
 }
 
-/** Notes about the BTF or tri-planar mapping of a material; null without any. */
-export function coverText(material: string): string | null {
-  const isProjected = materialOf(material)?.is_projected === true;
-  const sentences = [
-    isProjected && "The object has no UVs: the texture is projected along the world axes (tri-planar, 1 m per repeat).",
-    hasFreeCamera.value &&
-      isClientRendering.value &&
-      "While the camera moves, this browser draws the average of all texels.",
-  ].filter(Boolean);
-  return sentences.length > 0 ? sentences.join(" ") : null;
-}
+/** Note about the tri-planar mapping of a material; null without. */
+export const coverText = (material: string): string | null =>
+  materialOf(material)?.is_projected === true
+    ? "The object has no UVs: the texture is projected along the world axes (tri-planar, 1 m per repeat)."
+    : null;
 
 const fetchFit = async (query: string) => (await getInOut([JSON.parse(query) as Term]))[0] ?? null;
 

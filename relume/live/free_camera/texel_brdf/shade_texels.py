@@ -25,13 +25,21 @@ from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import is_edge
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.texel_brdf.coefficient_packing import NUM_COEFFICIENTS
-from relume.live.free_camera.texel_brdf.lanes import add_texels, integrate, pack_secondary_axes
+from relume.live.free_camera.texel_brdf.lanes import (
+    NUM_VIEWS,
+    TEXELS_PER_VIEW,
+    add_texels,
+    integrate,
+    pack_secondary_axes,
+)
+from relume.live.free_camera.texel_brdf.seen_relief import find_seen
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial, TexelTables
 from relume.live.free_camera.texel_brdf.texture_coordinates import (
     AZIMUTH,
     BATCH_SIZE,
     LEVEL,
     NUM_COLUMNS,
+    SHEAR,
     SIDE,
     THETA,
     U,
@@ -50,7 +58,7 @@ from relume.live.free_camera.texel_brdf.texture_frame_light import (
     rotation_from_vector,
 )
 from relume.probes.stored_scene import StoredScene
-from relume.transport.btf_kernel import texels_at_level
+from relume.transport.btf_kernel import linear_taps
 
 F32 = NDArray[np.float32]
 
@@ -102,30 +110,29 @@ class _TexelScratch(NamedTuple):
     """Scratch memory of a thread.
 
     Attributes:
-        texel, texel_weight, view, view_weight: of one ray. texels, texel_weights, views, view_weights: of a batch of
-            rays: 8 texels and 4 view directions each. num_texels: of each ray.
+        texels, texel_weights, views, view_weights: of a batch of rays: 4 view directions each, and 8 texels of each of
+            them. num_texels: of each view direction of a ray. view, view_weight: of one ray.
         columns: see `relume.live.free_camera.texel_brdf.texture_coordinates`. coefficients: of one ray.
     """
 
-    texel: NDArray[np.int32]
-    texel_weight: F32
-    view: NDArray[np.int32]
-    view_weight: F32
     texels: NDArray[np.int32]
     texel_weights: F32
     views: NDArray[np.int32]
     view_weights: F32
     num_texels: NDArray[np.int64]
+    view: NDArray[np.int32]
+    view_weight: F32
     columns: F32
     coefficients: F32
 
 
 def _allocate_scratch() -> _TexelScratch:
-    n = BATCH_SIZE
+    n, num_texels = BATCH_SIZE, NUM_VIEWS * TEXELS_PER_VIEW
     return _TexelScratch(
-        np.empty(8, np.int32), np.empty(8, np.float32), np.empty(4, np.int32), np.empty(4, np.float32),
-        np.empty(8 * n, np.int32), np.empty(8 * n, np.float32), np.empty(4 * n, np.int32), np.empty(4 * n, np.float32),
-        np.empty(n, np.int64), np.zeros(NUM_COLUMNS * n, np.float32), np.empty(NUM_COEFFICIENTS, np.float32),
+        np.zeros(num_texels * n, np.int32), np.zeros(num_texels * n, np.float32),
+        np.empty(NUM_VIEWS * n, np.int32), np.empty(NUM_VIEWS * n, np.float32), np.empty(n, np.int64),
+        np.empty(NUM_VIEWS, np.int32), np.empty(NUM_VIEWS, np.float32),
+        np.zeros(NUM_COLUMNS * n, np.float32), np.empty(NUM_COEFFICIENTS, np.float32),
     )  # fmt: skip
 
 
@@ -187,20 +194,57 @@ def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyp
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _fetch_texels(levels, direction_grid, weights, num_rays, scratch):  # type: ignore[no-untyped-def]
-    """Find the texels and view directions of each ray, and prefetch their coefficients while others are summed."""
-    texel, texel_weight, view, view_weight, texels, texel_weights, views, view_weights, num_texels, columns, _ = scratch
+def _neighbor_levels(level, coarsest):  # type: ignore[no-untyped-def]
+    """Return the finer of the mip levels around a fractional one, and the weight of the coarser.
+
+    One level alone serves half of all rays, which halves their fetches; the weight stays continuous.
+    """
+    clamped = min(level, np.float32(coarsest))
+    lower = np.int64(clamped)
+    fraction = F(2) * (np.float32(clamped - np.float32(lower)) - F(0.25))
+    if fraction >= 1:
+        return min(lower + 1, coarsest), F(0)
+    return lower, max(fraction, F(0)) if lower < coarsest else F(0)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _add_bilinear(levels, level, u, v, level_weight, first, texels, texel_weights):  # type: ignore[no-untyped-def]
+    """Write the four texels of a level around a position, from index `first` on, and their weights."""
+    start, height, width = levels[level, 0], levels[level, 1], levels[level, 2]
+    left, right, fx = linear_taps(u, width)
+    upper, below, fy = linear_taps(v, height)
+    upper, below = start + upper * width, start + below * width
+    texels[first], texels[first + 1] = upper + left, upper + right
+    texels[first + 2], texels[first + 3] = below + left, below + right
+    top, bottom = level_weight * (F(1) - fy), level_weight * fy
+    texel_weights[first], texel_weights[first + 1] = top * (F(1) - fx), top * fx
+    texel_weights[first + 2], texel_weights[first + 3] = bottom * (F(1) - fx), bottom * fx
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _fetch_texels(tables, direction_grid, num_rays, scratch):  # type: ignore[no-untyped-def]
+    """Find the view directions of each ray and the texels in which each of them shows what the ray meets, and prefetch
+    their coefficients while others are summed.
+    """
+    levels, weights, _, _, relief = tables
+    texels, texel_weights, views, view_weights, num_texels, view, view_weight, columns, _ = scratch
     for j in range(num_rays):
-        u, v, level = columns[U + j], columns[V + j], columns[LEVEL + j]
-        num_texels[j] = texels_at_level(levels, u, v, level, texel, texel_weight)
+        level, fraction = _neighbor_levels(columns[LEVEL + j], levels.shape[0] - 1)
+        num_texels[j] = 8 if fraction > 0 else 4
         interpolation_weights_at(direction_grid, columns[THETA + j], columns[AZIMUTH + j], view, view_weight)
-        for k in range(8):
-            texels[8 * j + k], texel_weights[8 * j + k] = texel[k], texel_weight[k]
-        for k in range(4):
-            views[4 * j + k], view_weights[4 * j + k] = view[k], view_weight[k]
-            for first in range(0, num_texels[j], 2):  # two beside each other are two lines of the cache at most
-                prefetch(weights, (view[k], texel[first], 0))
-                prefetch(weights, (view[k], texel[first + 1], NUM_COEFFICIENTS - 1))
+        for k in range(NUM_VIEWS):
+            views[NUM_VIEWS * j + k], view_weights[NUM_VIEWS * j + k] = view[k], view_weight[k]
+            first = TEXELS_PER_VIEW * (NUM_VIEWS * j + k)
+            u, v = find_seen(
+                relief, level, view[k], columns[U + j], columns[V + j], columns[SHEAR + j],
+                columns[SHEAR + BATCH_SIZE + j],
+            )  # fmt: skip
+            _add_bilinear(levels, level, u, v, F(1) - fraction, first, texels, texel_weights)
+            if fraction > 0:
+                _add_bilinear(levels, level + 1, u, v, fraction, first + 4, texels, texel_weights)
+            for pair in range(first, first + num_texels[j], 2):  # two beside each other: two cache lines at most
+                prefetch(weights, (view[k], texels[pair], 0))
+                prefetch(weights, (view[k], texels[pair + 1], NUM_COEFFICIENTS - 1))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
@@ -226,51 +270,59 @@ def _source_nodes(nodes, source, num_nodes):  # type: ignore[no-untyped-def]
     return np.uint32(nodes[0] + first), np.uint32(nodes[1] + first), np.uint32(nodes[2] + first)
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
+def _integrate_sources(btf, coefficients, light, shadow_visibility, ray, hit, frame):  # type: ignore[no-untyped-def]
+    """Integrate a texel's coefficients with the visible light of all sources, per channel.
+
+    Args:
+        btf: `_PlacedBtf`. light: `NodeLight`. shadow_visibility: (lights, rays). ray: its index.
+        hit: lattice nodes and their weights, tuples. frame: axes of the texture, tuples, and its handedness.
+    """
+    (tangents, vectors), (nodes, weights), (x, y, side) = light, hit, frame
+    rotations = _node_rotations(tangents, nodes, x, y)
+    red = green = blue = F(0)
+    for source in range(1 + shadow_visibility.shape[0]):
+        visible = F(1) if source == 0 else shadow_visibility[source - 1, ray]
+        if visible > 0:
+            visible_weights = visible * weights[0], visible * weights[1], visible * weights[2]
+            source_nodes = _source_nodes(nodes, source, tangents.shape[0])
+            radiance = integrate(
+                coefficients, btf.tables.axes, btf.secondary_axes, vectors, source_nodes, visible_weights, rotations,
+                side,
+            )  # fmt: skip
+            red, green, blue = red + radiance[0], green + radiance[1], blue + radiance[2]
+    return red, green, blue
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _shade_texels(  # type: ignore[no-untyped-def]
     btf, footprint, placements, normals, light, shadow_visibility, rows, start, stop, scratch, out
 ):
     """Shade rays rows[start:stop]. btf: `_PlacedBtf`. shadow_visibility: (lights, rays). out: (rays, 3)"""
     camera_position, pixel_angle, gbuffer = footprint
-    (levels, weights, step, axes), color, (tangents, vectors) = btf.tables, btf.color, light
-    lattice_node, weight, columns, coefficients = (
-        gbuffer.lattice_node,
-        gbuffer.weight,
-        scratch.columns,
-        scratch.coefficients,
-    )
-    finest = np.float32(max(levels[0, 1], levels[0, 2]))
+    tables, color, columns, coefficients = btf.tables, btf.color, scratch.columns, scratch.coefficients
+    lattice_node, weight = gbuffer.lattice_node, gbuffer.weight
+    finest, max_slope = np.float32(max(tables.levels[0, 1], tables.levels[0, 2])), tables.relief.max_slope
     for batch_start in range(start, stop, BATCH_SIZE):
         num_rays = min(BATCH_SIZE, stop - batch_start)
         gather_hits(placements, normals, gbuffer, rows, batch_start, num_rays, columns)
-        map_to_texture(columns, num_rays, camera_position, pixel_angle, btf.rotation, btf.scale, finest)
-        _fetch_texels(levels, btf.direction_grid, weights, num_rays, scratch)
+        map_to_texture(columns, num_rays, camera_position, pixel_angle, btf.rotation, btf.scale, finest, max_slope)
+        _fetch_texels(tables, btf.direction_grid, num_rays, scratch)
         for j in range(num_rays):
             ray = rows[batch_start + j]
             for first in range(0, scratch.num_texels[j], 4):
                 add_texels(
-                    weights, step, scratch.views, scratch.view_weights, 4 * j, scratch.texels, scratch.texel_weights,
-                    8 * j + first, first > 0, coefficients,
+                    tables.weight, tables.step, scratch.views, scratch.view_weights, NUM_VIEWS * j, scratch.texels,
+                    scratch.texel_weights, TEXELS_PER_VIEW * NUM_VIEWS * j + first, first > 0, coefficients,
                 )  # fmt: skip
             nodes = lattice_node[ray, 0], lattice_node[ray, 1], lattice_node[ray, 2]
             node_weights = weight[ray, 0], weight[ray, 1], weight[ray, 2]
-            x, y, side = get_vector(columns, X, j), get_vector(columns, Y, j), columns[SIDE + j]
-            node_rotations = _node_rotations(tangents, nodes, x, y)
-            red, green, blue = out[ray, 0], out[ray, 1], out[ray, 2]
-            for source in range(1 + shadow_visibility.shape[0]):
-                visible = F(1) if source == 0 else shadow_visibility[source - 1, ray]
-                if visible > 0:
-                    radiance = integrate(
-                        coefficients, axes, btf.secondary_axes, vectors, _source_nodes(nodes, source, tangents.shape[0]),
-                        (visible * node_weights[0], visible * node_weights[1], visible * node_weights[2]),
-                        node_rotations, side,
-                    )  # fmt: skip
-                    red, green, blue = (
-                        red + color[0] * radiance[0],
-                        green + color[1] * radiance[1],
-                        blue + color[2] * radiance[2],
-                    )
-            out[ray, 0], out[ray, 1], out[ray, 2] = max(red, F(0)), max(green, F(0)), max(blue, F(0))
+            frame = get_vector(columns, X, j), get_vector(columns, Y, j), columns[SIDE + j]
+            radiance = _integrate_sources(
+                btf, coefficients, light, shadow_visibility, ray, (nodes, node_weights), frame
+            )
+            for channel in range(3):
+                out[ray, channel] = max(out[ray, channel] + color[channel] * radiance[channel], F(0))
 
 
 def shade_texels(
