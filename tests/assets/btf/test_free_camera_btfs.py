@@ -15,7 +15,7 @@ from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
-from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES
+from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES, find_seen, see_relief
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import (
     BtfMaterials,
@@ -260,21 +260,22 @@ def test_view_directions_see_the_relief(small_btf):
     np.testing.assert_allclose(second, means, atol=1.01 * relief.step)
 
 
-def test_relief_is_found_between_view_directions(free_bake, small_btf, tmp_path, monkeypatch):
-    """As in fixed views, which follow each ray through the relief; without heights, relief is blurred."""
-    look_of = covered(free_bake, small_btf.record, scale=0.7)
-    expected = render_image(opened(floor(), tmp_path), "front", look_of)
-    with_relief = render_image(free_bake, "front", look_of)
-    whole = find_btf_materials(terms_of(look_of))
-    flat = [
-        cover._replace(
-            tables=cover.tables._replace(relief=cover.tables.relief._replace(step=np.float32(0), lowest=np.float32(0)))
-        )
-        for cover in whole.available
-    ]
-    monkeypatch.setattr(frame, "find_btf_materials", lambda *_, **__: BtfMaterials(flat, []))
-    without = render_image(free_bake, "front", look_of)
-    assert np.linalg.norm(with_relief - expected) < 0.7 * np.linalg.norm(without - expected)
+def test_relief_is_found_between_view_directions(small_btf):
+    """Where a stored view shows what a ray meets: near the point that a march along the ray finds."""
+    whole, rng = load_btf(small_btf.record.data), np.random.default_rng(5)
+    relief, shears, (rows, columns) = see_relief(whole, whole.levels), compute_shears(whole.grid), whole.size
+    found, missed = [], []
+    for uv, theta, phi in zip(rng.random((200, 2)), rng.uniform(0.2, 1.1, 200), rng.uniform(0, 6.28, 200), strict=True):
+        wo = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+        height = parallax_intersection_numpy(whole.height, uv, wo[:2] / wo[2])
+        view = interpolation_weights_numpy(whole.grid, wo[None])[0][0, 0]
+        change = (wo[:2] / wo[2] - shears[view]) * [1, -1]
+        shown = np.array(find_seen.py_func(relief, 0, view, *np.float32(uv), *np.float32(wo[:2] / wo[2])))
+        difference = (shown - uv - height * change + 0.5) % 1 - 0.5
+        found.append(np.linalg.norm(difference * [columns, rows]))
+        missed.append(np.linalg.norm(height * change * [columns, rows]))
+    assert np.median(found) < 0.1
+    assert np.mean(found) < 0.5 * np.mean(missed)
 
 
 def test_a_btf_is_weighted_next_to_other_terms(free_bake, small_btf, tmp_path):
