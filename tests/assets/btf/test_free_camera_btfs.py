@@ -15,7 +15,7 @@ from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
-from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES, find_seen, see_relief
+from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES, height_seen, see_relief
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import (
     BtfMaterials,
@@ -96,14 +96,14 @@ def factors(numbers, axes):
     return out
 
 
-def seen_position_numpy(relief, side, uv, wo):
-    """Reference of `find_seen` at the finest level, in repeats."""
-    change = (wo[:2] / wo[2] - relief.shear[side]) * [1, -1]
+def height_seen_numpy(relief, view, uv, wo):
+    """Reference of `height_seen` at the finest level."""
+    change = (wo[:2] / wo[2] - relief.shear[view]) * [1, -1]
     (_, rows, columns), height = relief.levels[0], float(relief.lowest + 255 * relief.step)
     for _ in range(NUM_FETCHES):
         column, row = (np.floor((uv + height * change) * [columns, rows]) % [columns, rows]).astype(int)
-        height = float(relief.lowest + relief.step * relief.height[side, row * columns + column])
-    return uv + height * change
+        height = float(relief.lowest + relief.step * relief.height[view, row * columns + column])
+    return height
 
 
 def shade_ray_numpy(cover, d, position):
@@ -115,8 +115,9 @@ def shade_ray_numpy(cover, d, position):
     wo, uv, total = -(axes @ d), SCALE * np.array([across @ position, -up @ position]), np.zeros(3)
     light = pack_lanes(basis_functions(axes @ TO_LIGHT))
     view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, wo[None])
+    height = height_seen_numpy(tables.relief, view[0, of_view[0].argmax()], uv, wo)
     for side, weight in zip(view[0], of_view[0], strict=True):
-        column, row = size * seen_position_numpy(tables.relief, side, uv, wo) - 0.5
+        column, row = size * (uv + height * (wo[:2] / wo[2] - tables.relief.shear[side]) * [1, -1]) - 0.5
         numbers = np.zeros(tables.step.shape[1])
         for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
             fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
@@ -270,9 +271,8 @@ def test_relief_is_found_between_view_directions(small_btf):
         height = parallax_intersection_numpy(whole.height, uv, wo[:2] / wo[2])
         view = interpolation_weights_numpy(whole.grid, wo[None])[0][0, 0]
         change = (wo[:2] / wo[2] - shears[view]) * [1, -1]
-        shown = np.array(find_seen.py_func(relief, 0, view, *np.float32(uv), *np.float32(wo[:2] / wo[2])))
-        difference = (shown - uv - height * change + 0.5) % 1 - 0.5
-        found.append(np.linalg.norm(difference * [columns, rows]))
+        seen = height_seen.py_func(relief, 0, view, *np.float32(uv), *np.float32(wo[:2] / wo[2]))
+        found.append(np.linalg.norm((seen - height) * change * [columns, rows]))
         missed.append(np.linalg.norm(height * change * [columns, rows]))
     assert np.median(found) < 0.1
     assert np.mean(found) < 0.5 * np.mean(missed)

@@ -17,6 +17,7 @@ from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import NDArray
 
 from relume.core.simd import (
+    FAST,
     NUM,
     VECTOR,
     WORD,
@@ -69,29 +70,25 @@ def add_texels(typing_context, weight, step, view, view_weight, first_view, texe
             for kind, value in zip(signature.args, arguments, strict=True)
             if isinstance(kind, types.Array)
         )
-        texel_locations = [
-            [builder.add(first, constant_index(TEXELS_PER_VIEW * side + k)) for k in range(_TEXELS)]
-            for side in range(NUM_VIEWS)
-        ]
-        texel_indices = [[builder.sext(texels.load(at), WORD) for at in row] for row in texel_locations]
-        texel_vectors = [[broadcast(builder, texel_weights.load(at)) for at in row] for row in texel_locations]
-        locations = [builder.add(first_view, constant_index(k)) for k in range(NUM_VIEWS)]
-        sides = [builder.sext(views.load(location), WORD) for location in locations]
-        side_weights = [broadcast(builder, view_weights.load(location)) for location in locations]
         zero = ir.Constant(VECTOR, [0.0] * NUM)
-        for lane in map(constant_index, range(0, NUM_COEFFICIENTS, NUM)):
-            location, contributions = sums.vector_pointer(lane), []
-            for k, (side, side_weight) in enumerate(zip(sides, side_weights, strict=True)):
-                texel_sum = dot(
-                    builder,
-                    texel_vectors[k],
-                    [weights.load_int8_vector(side, texel_index, lane) for texel_index in texel_indices[k]],
-                )
-                contributions.append(
-                    multiply(builder, multiply(builder, side_weight, steps.load_vector(side, lane)), texel_sum)
-                )
-            before = builder.select(is_more, builder.load(location, align=4), zero)
-            builder.store(sum_values(builder, [before, *contributions]), location, align=4)
+        lanes = [constant_index(lane) for lane in range(0, NUM_COEFFICIENTS, NUM)]
+        pointers = [sums.vector_pointer(lane) for lane in lanes]
+        totals = [builder.select(is_more, builder.load(pointer, align=4), zero) for pointer in pointers]
+        for k in range(NUM_VIEWS):  # view by view: the weights of all would not fit the registers
+            at = builder.add(first_view, constant_index(k))
+            side, side_weight = builder.sext(views.load(at), WORD), view_weights.load(at)
+            texel_indices, texel_vectors = [], []
+            for texel in range(_TEXELS):
+                at = builder.add(first, constant_index(TEXELS_PER_VIEW * k + texel))
+                texel_indices.append(builder.sext(texels.load(at), WORD))
+                weight = builder.fmul(side_weight, texel_weights.load(at), FAST)
+                texel_vectors.append(broadcast(builder, weight))
+            for i, lane in enumerate(lanes):
+                values = [weights.load_int8_vector(side, texel_index, lane) for texel_index in texel_indices]
+                texel_sum = multiply(builder, steps.load_vector(side, lane), dot(builder, texel_vectors, values))
+                totals[i] = sum_values(builder, [totals[i], texel_sum])
+        for pointer, total in zip(pointers, totals, strict=True):
+            builder.store(total, pointer, align=4)
         return context.get_dummy_value()
 
     range_types = types.int64, texel, texel_weight, types.int64, types.boolean

@@ -1,13 +1,12 @@
 """The relief of a BTF as each view direction sees it: where a direction between them finds the same point.
 
 A ray toward v that crosses the plane at y meets the relief at height H_v(y). A ray toward ω that crosses at x meets the
-point that v sees at
+relief at the height h that the nearest direction v sees,
 
-    x_v = x + H_v(x_v) (s(ω) − s(v)) ,
+    h = H_v(x + h (s(ω) − s(v))) ,
 
-with s of `relume.assets.btf.parallax`. A fixed-point iteration from the top of the relief finds the point with a few
-fetches, where a ray would march through the relief; the points of the four views differ where one hides what another
-sees.
+with s of `relume.assets.btf.parallax`. A fixed-point iteration from the top of the relief finds it with two fetches,
+where a ray would march through the relief. All four views around ω then look up x_v of that height.
 """
 
 from __future__ import annotations
@@ -91,14 +90,12 @@ def see_relief(pca_btf: LocalPcaBtf, levels: Shaped[NDArray[np.int32], "levels 3
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def find_seen(relief, level, view, u, v, shear_u, shear_v):  # type: ignore[no-untyped-def]
-    """Find where a view direction shows what a ray meets: x_v.
+def height_seen(relief, level, view, u, v, shear_u, shear_v):  # type: ignore[no-untyped-def]
+    """Find the height of what a ray meets, as a view direction near it sees it.
 
     Args:
         relief: the `SeenRelief`. level: mip level of the BTF. view: index of the view direction.
         u, v: crossing of the ray with the plane, in repeats, [0, 1). shear_u, shear_v: s of the ray.
-    Returns:
-        u and v there, [0, 1).
     """
     stored_level = min(max(level - relief.skip, 0), relief.levels.shape[0] - 1)
     first, rows, columns = (
@@ -113,4 +110,4 @@ def find_seen(relief, level, view, u, v, shear_u, shear_v):  # type: ignore[no-u
         row = min(np.int32(y * np.float32(rows)), rows - 1)
         column = min(np.int32(x * np.float32(columns)), columns - 1)
         h = relief.lowest + relief.step * np.float32(relief.height[view, first + row * columns + column])
-    return repeat_fraction(u + h * across), repeat_fraction(v - h * up)
+    return h

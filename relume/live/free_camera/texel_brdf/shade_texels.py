@@ -32,7 +32,7 @@ from relume.live.free_camera.texel_brdf.lanes import (
     integrate,
     pack_secondary_axes,
 )
-from relume.live.free_camera.texel_brdf.seen_relief import find_seen
+from relume.live.free_camera.texel_brdf.seen_relief import height_seen
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial, TexelTables
 from relume.live.free_camera.texel_brdf.texture_coordinates import (
     AZIMUTH,
@@ -50,6 +50,7 @@ from relume.live.free_camera.texel_brdf.texture_coordinates import (
     gather_hits,
     get_vector,
     map_to_texture,
+    repeat_fraction,
     vector_row,
 )
 from relume.live.free_camera.texel_brdf.texture_frame_light import (
@@ -63,6 +64,7 @@ from relume.transport.btf_kernel import linear_taps
 F32 = NDArray[np.float32]
 
 F = np.float32
+_LEVEL_SLOPE = F(4 / 3)  # of a coarser mip level's weight
 _CHUNKS_PER_THREAD = 4  # per thread: rays that hit fine texels cost more
 
 
@@ -197,11 +199,11 @@ def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyp
 def _neighbor_levels(level, coarsest):  # type: ignore[no-untyped-def]
     """Return the finer of the mip levels around a fractional one, and the weight of the coarser.
 
-    One level alone serves half of all rays, which halves their fetches; the weight stays continuous.
+    One level alone serves a quarter of all rays, which halves their fetches; the weight stays continuous.
     """
     clamped = min(level, np.float32(coarsest))
     lower = np.int64(clamped)
-    fraction = F(2) * (np.float32(clamped - np.float32(lower)) - F(0.25))
+    fraction = _LEVEL_SLOPE * (np.float32(clamped - np.float32(lower)) - F(0.5)) + F(0.5)
     if fraction >= 1:
         return min(lower + 1, coarsest), F(0)
     return lower, max(fraction, F(0)) if lower < coarsest else F(0)
@@ -232,13 +234,17 @@ def _fetch_texels(tables, direction_grid, num_rays, scratch):  # type: ignore[no
         level, fraction = _neighbor_levels(columns[LEVEL + j], levels.shape[0] - 1)
         num_texels[j] = 8 if fraction > 0 else 4
         interpolation_weights_at(direction_grid, columns[THETA + j], columns[AZIMUTH + j], view, view_weight)
+        shear_u, shear_v = columns[SHEAR + j], columns[SHEAR + BATCH_SIZE + j]
+        nearest = 0
+        for k in range(1, NUM_VIEWS):
+            if view_weight[k] > view_weight[nearest]:
+                nearest = k
+        h = height_seen(relief, level, view[nearest], columns[U + j], columns[V + j], shear_u, shear_v)
         for k in range(NUM_VIEWS):
             views[NUM_VIEWS * j + k], view_weights[NUM_VIEWS * j + k] = view[k], view_weight[k]
             first = TEXELS_PER_VIEW * (NUM_VIEWS * j + k)
-            u, v = find_seen(
-                relief, level, view[k], columns[U + j], columns[V + j], columns[SHEAR + j],
-                columns[SHEAR + BATCH_SIZE + j],
-            )  # fmt: skip
+            u = repeat_fraction(columns[U + j] + h * (shear_u - relief.shear[view[k], 0]))
+            v = repeat_fraction(columns[V + j] - h * (shear_v - relief.shear[view[k], 1]))
             _add_bilinear(levels, level, u, v, F(1) - fraction, first, texels, texel_weights)
             if fraction > 0:
                 _add_bilinear(levels, level + 1, u, v, fraction, first + 4, texels, texel_weights)

@@ -23,6 +23,7 @@ from relume.transport.btf_kernel import mip_level
 F32 = NDArray[np.float32]
 
 _EPSILON = np.float32(1e-30)
+_FILTER_WIDTH = np.float32(2 / math.sqrt(3))  # gives one bilinear lookup, box and tent, the variance of the footprint
 _MAX_REPEATS = np.float32(1 << 30)  # repeats: beyond, float32 has no fraction of one
 
 BATCH_SIZE = 64  # rays; all their columns fit the L1 cache
@@ -214,7 +215,7 @@ def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, 
             repeat_fraction(scale * (c * u - s * v)),
             repeat_fraction(scale * (s * u + c * v)),
         )
-        columns[LEVEL + j] = mip_level(footprint, finest)
+        columns[LEVEL + j] = mip_level(_FILTER_WIDTH * footprint, finest)
         wx, wy, wz = -dot(d, x), -dot(d, y), -dot(d, n)
         columns[THETA + j], columns[AZIMUTH + j] = acos_clamped(wz), azimuth_fraction(wx, wy)
         inverse = np.float32(1) / max(wz, math.sqrt(wx * wx + wy * wy) / max_slope, _EPSILON)
