@@ -23,7 +23,7 @@ from relume.look import Look, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.still_life.still_life import look_at
-from relume.scene.model import Material, Mesh, Scene
+from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
@@ -36,6 +36,7 @@ from relume_bench.mitsuba import bsdf, missing, read_passes, render
 from relume_bench.standard_error import compare_with_passes
 
 _NUM_VISIBLE_PERIODS = 1.5  # periods across the image
+_FAR = 60.0  # camera distance, periods
 _REACH = 2  # periods of the geometry on each side; light from θ = 82° crosses half a period of it
 _CAMERA_ANGLES = (22.0, 17.0), (52.0, 200.0)  # θ and φ, degrees: as far as possible from all directions of the BTF
 
@@ -53,7 +54,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     tile = GEOMETRIES["weave"]()
     errors = []
     for k, (theta, phi) in enumerate(_CAMERA_ANGLES):
-        plane, displaced_scene = _make_scenes(tile, theta, phi)
+        plane, displaced_scene = make_scenes(tile, studio(), [(theta, phi)])
         bake, look = bake_with_btf(plane, record, size, folder / f"{k}.zarr", 60 if tiny else 2000)
         rendered = render_image(bake, "camera", look)[..., :3]
         reference_passes = traced_by_peer(displaced_scene, size, spp, [tile.materials[0]], folder / f"peer{k}")
@@ -112,7 +113,7 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
     Args:
         record: record of the BTF. values: uncompressed. folder: for stores. tiny: a trial run.
     """
-    plane, _ = _make_scenes(GEOMETRIES["weave"](), *_CAMERA_ANGLES[0])
+    plane, _ = make_scenes(GEOMETRIES["weave"](), studio(), _CAMERA_ANGLES[:1])
     size = (12, 12) if tiny else (96, 96)
     bake, look = bake_with_btf(plane, record, size, folder / "table.zarr", 60 if tiny else 1000)
     view = bake.views["camera"]
@@ -170,22 +171,28 @@ def _from_table(values: ValueFile, lights: Any, receivers: Any, uv: NDArray[np.f
     return out
 
 
-def _make_scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
-    """A plane to cover, and the actual geometry, both Y up, viewed from far away."""
-    t, p = np.radians([theta, phi])
-    towards = np.array([np.sin(t) * np.cos(p), np.cos(t), -np.sin(t) * np.sin(p)])
-    far = 60.0
-    camera = look_at(
-        "camera", tuple(far * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _NUM_VISIBLE_PERIODS / far))
-    )
-    radiance = np.array(studio().radiance)
-    radiance[len(radiance) // 2 :] = 0  # the BTF has no light from below, which gaps of the geometry would let through
-    environment = Environment("sky", radiance)
-    material = (Material("Cloth", tile.materials[0]),)
+def make_scenes(tile: Any, sky: Environment, angles: Sequence[tuple[float, float]]) -> tuple[Scene, Scene]:
+    """A plane to cover, and the actual geometry, both Y up, viewed from far away by a camera for each θ and φ.
+
+    Args:
+        tile: one period. sky: its upper half lights both; the BTF has no light from below, which gaps of the geometry
+            would let through. angles: of the cameras, degrees.
+    """
+    radiance = np.array(sky.radiance)
+    radiance[len(radiance) // 2 :] = 0
+    environment, material = Environment("sky", radiance), (Material("Cloth", tile.materials[0]),)
+    cameras = [_far_camera(f"camera{number or ''}", *pair) for number, pair in enumerate(angles)]
     return tuple(  # type: ignore[return-value]
-        make_scene(name, [mesh], material, [camera], environment)
+        make_scene(name, [mesh], material, cameras, environment)
         for name, mesh in (("plane", _plane()), ("geometry", _make_displaced_geometry(tile)))
     )
+
+
+def _far_camera(name: str, theta: float, phi: float) -> Camera:
+    """A camera towards the origin. theta, phi: degrees."""
+    t, p = np.radians([theta, phi])
+    position = _FAR * np.array([np.sin(t) * np.cos(p), np.cos(t), -np.sin(t) * np.sin(p)])
+    return look_at(name, tuple(position), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _NUM_VISIBLE_PERIODS / _FAR)))
 
 
 def _plane() -> Mesh:

@@ -57,7 +57,7 @@ def open_values_folder(tiny: bool) -> Iterator[Path]:
             yield Path(trial)
         return
     makers = ("render", "weave", "pebbles", "corduroy")
-    folder = CACHE_FOLDER / code_hash(collect_sources([f"synthetic.{name}" for name in makers]))
+    folder = CACHE_FOLDER / code_hash(collect_sources([f"synthetic_btf.{name}" for name in makers]))
     for stale_folder in CACHE_FOLDER.iterdir() if CACHE_FOLDER.is_dir() else ():
         if stale_folder != folder:
             shutil.rmtree(stale_folder)

@@ -52,11 +52,18 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Terms of a material as a plugin of peer_mitsuba_plugins.py.
 
     Args:
-        terms: `lambert` terms and at most one `blinn_phong`, `ggx` or dielectric `cook_torrance`; without textures.
+        terms: `lambert` terms and at most one `blinn_phong`, `ggx` or dielectric `cook_torrance`, or one `oren_nayar`;
+            without textures.
     """
     whole = [complete_term(("mitsuba",), term, None) for term in terms]
     diffuse = np.sum([term["color"] for term in whole if term["model"] == "lambert"] or [[0.0] * 3], axis=0).tolist()
     lobes = [term for term in whole if term["model"] != "lambert"]
+    if lobes and lobes[0]["model"] == "oren_nayar":
+        params = lobes[0]["params"]
+        return {
+            "type": "oren_nayar", "albedo": diffuse, "gain": lobes[0]["color"], "sigma": params["sigma"],
+            "facet_albedo": params["albedo"],
+        }  # fmt: skip
     if lobes and lobes[0]["model"] == "cook_torrance":
         params = lobes[0]["params"]
         return {

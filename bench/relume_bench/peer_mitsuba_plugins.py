@@ -130,6 +130,36 @@ class LambertBlinnPhong(_TwoLobes):
 mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 
 
+class OrenNayar(_TwoLobes):
+    """gain times the full model of Oren and Nayar 1994; samples the cosine."""
+
+    def __init__(self, props: Any) -> None:
+        super().__init__(props)
+        self.sigma, self.facet_albedo = float(props["sigma"]), float(props["facet_albedo"])
+
+    def _glossy(self, wi: Any, wo: Any) -> Any:
+        cos_i, cos_o = mi.Frame3f.cos_theta(wi), mi.Frame3f.cos_theta(wo)
+        alpha, beta = dr.safe_acos(dr.minimum(cos_i, cos_o)), dr.safe_acos(dr.maximum(cos_i, cos_o))
+        sines = dr.maximum(mi.Frame3f.sin_theta(wi) * mi.Frame3f.sin_theta(wo), 1e-9)
+        cos_phi = dr.clip((wi.x * wo.x + wi.y * wo.y) / sines, -1, 1)
+        variance, low = self.sigma**2, 2 / dr.pi * beta
+        roughness = variance / (variance + 0.09)
+        c1, c3 = 1 - 0.5 * variance / (variance + 0.33), 0.125 * roughness * (2 / dr.pi * alpha * low) ** 2
+        c2 = 0.45 * roughness * (dr.sin(alpha) - dr.select(cos_phi < 0, low**3, 0))
+        once = c1 + cos_phi * c2 * dr.tan(beta) + c3 * (1 - dr.abs(cos_phi)) * dr.tan(0.5 * (alpha + beta))
+        twice = self.facet_albedo * 0.17 * variance / (variance + 0.13) * (1 - cos_phi * low**2)
+        return cos_o * dr.maximum(once + twice, 0) / dr.pi
+
+    def _density(self, wi: Any, wo: Any) -> Any:
+        return mi.warp.square_to_cosine_hemisphere_pdf(wo)
+
+    def _sample_direction(self, wi: Any, lobe_sample: Any, direction_sample: Any) -> Any:
+        return mi.warp.square_to_cosine_hemisphere(direction_sample)
+
+
+mi.register_bsdf("oren_nayar", lambda props: OrenNayar(props))
+
+
 class LambertGgx(_TwoLobes):
     """albedo/π + gain D F G1(wi) G1(wo) / (4 cos θi cos θo): GGX facets, Schlick's reflectance from f0.
 

@@ -342,7 +342,7 @@ export interface BakeMessage {
   seconds_left: number | null;
 }
 
-/** A BTF; looks refer to it by `data`, `terms` are its initial terms. `synthetic` describes the geometry that it was rendered from; null if it was measured. `error` is the relative RMS of the compression by number of components, starting with none; `ratio` is the compression ratio. */
+/** A BTF; looks refer to it by `data`, `terms` are its initial terms. `synthetic` describes the geometry that it was rendered from; null if it was measured. `error` is the relative RMS of the compression by number of components, starting with none; `ratio` is the compression ratio. It takes `memory_bytes` while it is shown. */
 export interface BtfBody {
   id: string;
   data: string;
@@ -357,6 +357,7 @@ export interface BtfBody {
   components: number;
   error: number[];
   ratio: number;
+  memory_bytes: number;
 }
 
 /** A BTF job. `material`: its id when ready. `geometry`: null for uploaded images. `user`: who requested it; `created`, `started` and `ended` are times; null: not yet. */

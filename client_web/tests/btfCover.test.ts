@@ -1,10 +1,13 @@
-/** What is said where a texture that looks different from every side covers a material. */
+/** What is said where a texture that looks different from every side covers a material, and who draws it. */
 import { expect, test, vi } from "vitest";
 import type { SceneBody } from "../src/protocol";
+import type { Look } from "../src/protocol";
+import { look } from "../src/state/look";
 import { scene } from "../src/state/scene";
-import { shownViews, views } from "../src/state/views";
 
 vi.hoisted(() => vi.stubGlobal("localStorage", { getItem: () => null, setItem: () => undefined }));
+const { showNote } = vi.hoisted(() => ({ showNote: vi.fn() }));
+vi.mock("../src/ui/toasts", async (original) => ({ ...(await original<object>()), showNote }));
 
 const material = (name: string, is_projected: boolean) => ({
   name,
@@ -14,17 +17,24 @@ const material = (name: string, is_projected: boolean) => ({
   is_glass: false,
 });
 
-test("notes about tri-planar mapping and about average texels in client rendering", async () => {
+test("a note about tri-planar mapping", async () => {
   const { coverText } = await import("../src/panels/inspector/ZernikeFit");
-  const { isClientRendering } = await import("../src/session/clientRendering");
   scene.value = { materials: [material("Bare", true), material("Textured", false)] } as unknown as SceneBody;
   expect(coverText("Bare")).toContain("no UVs: the texture is projected");
   expect(coverText("Textured")).toBe(null);
-  views.value = [{ name: "walk", camera_mode: "free" }] as unknown as typeof views.value;
-  shownViews.value = ["walk"];
-  isClientRendering.value = true;
-  expect(coverText("Textured")).toBe("While the camera moves, this browser draws the average of all texels.");
-  expect(coverText("Bare")).toMatch(/1 m per repeat\)\. While the camera moves/);
+});
+
+test("the server draws BTFs even if this browser was chosen, and says so once", async () => {
+  const { setRenderer, TEXEL_SHADING_NOTE } = await import("../src/session/clientRendering");
+  const covered = (model: string) => ({ materials: { Cloth: { terms: [{ model }] } } }) as unknown as Look;
+  scene.value = { materials: [material("Cloth", false)] } as unknown as SceneBody;
+  setRenderer("client");
+  look.value = covered("lambert");
+  expect(showNote).not.toHaveBeenCalled();
+  look.value = covered("measured_btf");
+  look.value = covered("lambert");
+  look.value = covered("measured_btf");
+  expect(showNote.mock.calls).toEqual([[TEXEL_SHADING_NOTE]]);
 });
 
 test("what is said of a term while the camera moves", async () => {

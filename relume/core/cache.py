@@ -308,6 +308,18 @@ def use_for_assets(cache: Cache) -> None:
     _AssetCache.cache = cache
 
 
+def check_assets(label: str, num_bytes: int, remedy: str) -> None:
+    """Check that assets that are used together fit the cache.
+
+    Args:
+        label: the assets, for users. num_bytes: their memory. remedy: what users can do.
+    Raises:
+        MemoryBudgetError: they are larger than the budget.
+    """
+    if num_bytes > _AssetCache.cache.budget_bytes:
+        raise MemoryBudgetError(label, num_bytes, _AssetCache.cache.budget_bytes, remedy)
+
+
 def asset_cached(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[Arguments, Value]]:
     """Decorator: cache the results of a function of asset files by its arguments.
 

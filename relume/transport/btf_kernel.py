@@ -36,7 +36,7 @@ _MAX_ELONGATION = np.float32(3)  # footprint length over width: longer ones sum 
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
+def linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
     """Return the two texels of a row around a coordinate in [0, 1], and the fraction of the second."""
     x = coordinate * np.float32(count) - np.float32(0.5)
     # floor without a call, for any coordinate
@@ -83,8 +83,8 @@ def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-unty
         if level_weight <= 0 or lower + step > coarsest:
             continue
         first, height, width = levels[lower + step, 0], levels[lower + step, 1], levels[lower + step, 2]
-        left, right, fx = _linear_taps(u, width)
-        upper, below, fy = _linear_taps(v, height)
+        left, right, fx = linear_taps(u, width)
+        upper, below, fy = linear_taps(v, height)
         upper, below = first + upper * width, first + below * width
         texel[num], texel[num + 1], texel[num + 2], texel[num + 3] = (
             upper + left,

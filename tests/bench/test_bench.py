@@ -34,7 +34,7 @@ LONG = [
     "gather_incremental", "glass", "roughness_maps", "mirror", "probes", "probes_edits",
     "probes_reference", "free_camera_accuracy", "canvas_free_camera", "btf", "btf_accuracy", "btf_speed", "load",
     "btf_edit", "many_sessions", "refusal", "slider_drag", "probes_static_view", "rotation",
-    "btf_several", "plan_disk", "probes_live", "probes_error", "assets",
+    "btf_several", "btf_moving", "plan_disk", "probes_live", "probes_error", "assets",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
     "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits",
 ]  # fmt: skip
@@ -57,6 +57,7 @@ ESTIMATES = (
     "probes.rmse_",
     "probes.probe_rmse",
     "btf.geometry_rmse",
+    "btf.moving_rmse",
     "btf.sphere_rmse",
 )
 

@@ -25,6 +25,10 @@ def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_j
 
 
 def print_btf(record: BtfRecord, *, as_json: bool) -> None:
-    """Print a BTF's name in looks, its terms, and its compression error."""
+    """Print a BTF's name in looks, its terms, its compression error and its memory."""
+    from relume.assets.btf.btf_memory import memory_bytes
+    from relume.core.errors import bytes_text
+
+    memory = bytes_text(memory_bytes(record.size, record.directions, record.clusters, record.components))
     summary = f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
-    print_material(record, [f"{summary}{record.error[-1]:.1%} relative RMS"], as_json=as_json)
+    print_material(record, [f"{summary}{record.error[-1]:.1%} relative RMS, {memory} while shown"], as_json=as_json)

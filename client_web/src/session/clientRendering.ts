@@ -27,15 +27,20 @@ export const rendererChoice = signal<RendererMode>(loadRendererChoice());
 export const isClientRendering = signal(false);
 /** True if the server traces rays along narrow lobes, which this browser cannot draw. */
 export const tracesLobes = signal(false);
-/** True if the server draws: chosen, or automatic with features that this browser cannot draw. */
+/** Why the server draws although this browser was chosen. */
+export const TEXEL_SHADING_NOTE =
+  "The server draws while the camera moves, because this look uses BTFs or tri-planar textures.";
+/** True if the server draws: chosen, for textures that this browser cannot draw, or automatic with narrow lobes. */
 const isServerRendering = computed(
   () =>
     rendererChoice.value === "server" ||
-    (rendererChoice.value === "auto" && (usesTexelShading.value || tracesLobes.value)),
+    usesTexelShading.value ||
+    (rendererChoice.value === "auto" && tracesLobes.value),
 );
 
 let clientRenderer: ClientRenderer | null = null;
 let loadingConnection: BakeConnection | null = null;
+let isTexelNoteShown = false;
 
 function loadRendererChoice(): RendererMode {
   try {
@@ -182,6 +187,12 @@ async function loadArray(bakeConnection: BakeConnection, name: string): Promise<
 
 const arrayUrl = ({ bake }: BakeConnection, array = ""): string =>
   `/api/bakes/${encodeURIComponent(bake)}/probes${array}?layout=${PROBES_LAYOUT}`;
+
+effect(() => {
+  if (isTexelNoteShown || rendererChoice.value !== "client" || !usesTexelShading.value) return;
+  isTexelNoteShown = true;
+  showNote(TEXEL_SHADING_NOTE);
+});
 
 effect(() => {
   const choice = rendererChoice.value;

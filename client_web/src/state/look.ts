@@ -11,7 +11,7 @@ export const defaultLook = signal<Look | null>(null);
 export const exposure = computed(() => look.value?.display.exposure ?? 0);
 /** True with the environment that the bake was made for; in another one, "exact" means exact for this bake. */
 export const usesBakedEnvironment = computed(() => (look.value?.environment.map ?? null) === null);
-/** True for a BTF term, of which this browser draws the average of all texels. */
+/** True for a BTF term, whose texels the server draws. */
 export const isBtfTerm = (term: Term): boolean => term.model === "measured_btf";
 /** True if a material without UVs has a tri-planar texture, which this browser cannot draw. */
 const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.assets.btf.btf_memory import check_btfs_fit
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ParameterError
@@ -93,10 +94,11 @@ class Picture:
         """Check that a look can be shown, without changing the picture.
 
         Raises:
-            MemoryBudgetError: the images of its terms exceed the memory budget.
+            MemoryBudgetError: the images of its terms, or its BTFs, exceed the memory budget.
             ResultUnavailableError: its glass must be traced, and the scene is not available.
         """
         self._glass.check(glass_of(look))
+        check_btfs_fit(term for material in look.materials.values() for term in material.terms)
         samples = ((m.num_samples, len(material_documents(look, name))) for name, m in self._images.by_name.items())
         self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
 

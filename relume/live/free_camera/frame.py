@@ -37,7 +37,7 @@ from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData,
 from relume.live.free_camera.shade_probes import ProbeRadiance, shade_probes
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterials, find_btf_materials
-from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
+from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight, TexelSource
 from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
 from relume.probes.stored_scene import StoredScene, ViewedProbes
@@ -262,6 +262,7 @@ def finish_rays(
     buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
     out = buffers.radiance
     _add_hard_shadow_lights(transfer, state, gbuffer, camera, height, shadow_visibility, None, out)
+    _shade_btf_texels(transfer, state, gbuffer, camera, height, shadow_visibility, out)
     _add_lobe_rays(transfer, state, gbuffer, camera, size, None, out)
     if (state.gain != 1).any():
         out *= state.gain
@@ -387,14 +388,6 @@ def _shade(
     )
     mirror_data = MirrorData(lobes, environment, node_visibility, node_gradients, state.is_fine)
     out = shade_pixels(stored_scene, gbuffer, pixel_angle, interpolated_probes, emission, mirror_data, rays, out)
-    if rays is None:  # otherwise no ray hits a BTF
-        footprint, texel_incident = (
-            TextureFootprint(viewed.camera_position, pixel_angle, gbuffer),
-            IncidentTexelLight(incident.total, state.texel_light),
-        )
-        shade_texels(
-            materials.btf_materials.available, transfer.stored_scene, transfer.positions, footprint, texel_incident, out
-        )
     return ShadingBuffers(
         lobe_visibility, outgoing, gradients, (node_radiance, node_visibility, node_gradients), light_gradient, out
     )
@@ -446,6 +439,25 @@ def _add_hard_shadow_lights(
         rays,
         out,
     )
+
+
+def _shade_btf_texels(
+    transfer: FreeCameraTransfer,
+    state: FrameRequestState,
+    gbuffer: GBuffer,
+    camera: Camera,
+    height: int,
+    shadow_visibility: Sequence[F32],
+    out: F32,
+) -> None:
+    """Replace mean texels of BTFs by texels, in all light that probes and hard-shadow lights give. out: (rays, 3)"""
+    sources = [TexelSource(state.incident.total)]
+    for light, visibility in zip(state.incident.hard_shadow_lights, shadow_visibility, strict=True):
+        sources.append(TexelSource(light.vectors, tuple(light.gain.tolist()), visibility))
+    camera_position = camera.to_world[:3, 3].astype(np.float32)
+    footprint = TextureFootprint(camera_position, camera.yfov / height, gbuffer)
+    incident, available = IncidentTexelLight(sources, state.texel_light), state.materials.btf_materials.available
+    shade_texels(available, transfer.stored_scene, transfer.positions, footprint, incident, out)
 
 
 def _add_lobe_rays(

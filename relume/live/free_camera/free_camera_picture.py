@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.assets.btf.btf_memory import check_btfs_fit
 from relume.core.errors import ParameterError, ResultUnavailableError
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, check_exists, parse_pointer
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -101,7 +102,12 @@ class FreeCameraPicture:
         self._vectors_version = self._materials_version = 0
 
     def check(self, look: Look) -> None:
-        """Check that a look can be shown: always true, since tables represent any number of terms."""
+        """Check that a look can be shown: tables represent any number of terms, but BTFs may be too large together.
+
+        Raises:
+            MemoryBudgetError: its BTFs exceed the memory budget.
+        """
+        check_btfs_fit(term for material in look.materials.values() for term in material.terms)
 
     def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
         """Set a new target; nothing is computed yet.
@@ -269,11 +275,8 @@ class FreeCameraPicture:
         return self._is_watched and not self._probe_light.is_available(self._light_request())
 
     def _light_request(self) -> LightRequest:
-        """Return the light request; hard shadows per pixel are not available in the browser's renderer or on BTFs."""
-        assert self._look is not None
-        return LightRequest(
-            self._current_light(), self.renders_pixels and not any(self._material_state(self._look).btf_materials)
-        )
+        """Return the light request; hard shadows per pixel are not available in the browser's renderer."""
+        return LightRequest(self._current_light(), self.renders_pixels)
 
     @property
     def _needed_probes(self) -> NDArray[np.uint8]:

@@ -146,7 +146,8 @@ class BtfBody(Body):
     """A BTF; looks refer to it by `data`, `terms` are its initial terms.
 
     `synthetic` describes the geometry that it was rendered from; null if it was measured. `error` is the relative RMS
-    of the compression by number of components, starting with none; `ratio` is the compression ratio.
+    of the compression by number of components, starting with none; `ratio` is the compression ratio. It takes
+    `memory_bytes` while it is shown.
     """
 
     id: str
@@ -162,6 +163,7 @@ class BtfBody(Body):
     components: int
     error: tuple[float, ...]
     ratio: float
+    memory_bytes: int
 
 
 class EnvironmentBody(Body):

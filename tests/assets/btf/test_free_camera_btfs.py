@@ -4,15 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from btf_reference import parallax_intersection_numpy
 from numpy.typing import NDArray
 from test_fixed_camera_btfs import CAMERA, GRAY, SIZE, covered, floor, opened
 
 from relume.assets.btf.btf_store import load_btf
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
+from relume.assets.btf.parallax import compute_shears
 from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
+from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES, height_seen, see_relief
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import (
     BtfMaterials,
@@ -20,7 +23,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import (
     find_btf_materials,
     pack_lanes,
 )
-from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight
+from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight, TexelSource
 from relume.look import validate
 from relume.math.zernike import basis_functions, recurrence
 from relume.output.render_image import render_image
@@ -82,7 +85,7 @@ def terms_of(look_of):
 
 
 def incident_light(surface):
-    return IncidentTexelLight(vectors_of(surface, TO_LIGHT), TexelLight())
+    return IncidentTexelLight([TexelSource(vectors_of(surface, TO_LIGHT))], TexelLight())
 
 
 def factors(numbers, axes):
@@ -93,22 +96,35 @@ def factors(numbers, axes):
     return out
 
 
+def height_seen_numpy(relief, view, uv, wo):
+    """Reference of `height_seen` at the finest level."""
+    change = (wo[:2] / wo[2] - relief.shear[view]) * [1, -1]
+    (_, rows, columns), height = relief.levels[0], float(relief.lowest + 255 * relief.step)
+    for _ in range(NUM_FETCHES):
+        column, row = (np.floor((uv + height * change) * [columns, rows]) % [columns, rows]).astype(int)
+        height = float(relief.lowest + relief.step * relief.height[view, row * columns + column])
+    return height
+
+
 def shade_ray_numpy(cover, d, position):
     """Reference of a ray on the floor, minus the mean, in plain NumPy; its texture's x is to the right, y away."""
     turn, tables = np.radians(ROTATION), cover.tables
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
-    axes, (height, width) = np.array([across, up, [0, 1, 0]]), cover.texels.btf.size
-    column, row = SCALE * np.array([width * across @ position, -height * up @ position]) - 0.5
-    numbers = np.zeros(tables.step.shape)
-    for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
-        number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
-        numbers += fraction * tables.step * tables.weight[:, number].astype(float)
+    axes, size = np.array([across, up, [0, 1, 0]]), np.array(cover.texels.btf.size[::-1])
+    wo, uv, total = -(axes @ d), SCALE * np.array([across @ position, -up @ position]), np.zeros(3)
     light = pack_lanes(basis_functions(axes @ TO_LIGHT))
-    view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, -(axes @ d)[None])
-
-    return np.einsum("a,ack,k->c", of_view[0], factors(numbers, tables.axes)[view[0]], light)
+    view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, wo[None])
+    height = height_seen_numpy(tables.relief, view[0, of_view[0].argmax()], uv, wo)
+    for side, weight in zip(view[0], of_view[0], strict=True):
+        column, row = size * (uv + height * (wo[:2] / wo[2] - tables.relief.shear[side]) * [1, -1]) - 0.5
+        numbers = np.zeros(tables.step.shape[1])
+        for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
+            number = int((np.floor(row) + down) % size[1] * size[0] + (np.floor(column) + beside) % size[0])
+            numbers += fraction * tables.step[side] * tables.weight[side, number].astype(float)
+        total += weight * factors(numbers, tables.axes) @ light
+    return total
 
 
 def test_the_free_camera_kernel_equals_the_reference(free_bake, small_btf):
@@ -140,8 +156,8 @@ def test_light_around_a_node_equals_the_reference(free_bake):
     surface = replace(surface, probes=surface.probes._replace(tangent=tangent))
     vectors = rng.normal(size=free_bake.vectors_shape).astype(np.float32)
     light, num = TexelLight(), len(surface.lattice_nodes.normal)
-    light.around_nodes(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
-    actual = light.around_nodes(surface, vectors, np.ones(num, np.uint8))
+    light.around_nodes(surface, [TexelSource(vectors)], np.arange(num, dtype=np.uint8) % 2)
+    actual = light.around_nodes(surface, [TexelSource(vectors)], np.ones(num, np.uint8))
     for vertex in range(0, len(actual.tangent), 37):
         expected, along = node_light_numpy(surface.lattice_nodes, tangent, vectors, vertex)
         np.testing.assert_allclose(
@@ -161,8 +177,29 @@ def test_changed_light_is_not_taken_from_the_cache(free_bake):
         np.ones(len(free_bake.stored_scene.lattice_nodes.normal), np.uint8),
     )
     dark, bright = np.zeros(free_bake.vectors_shape, np.float32), np.ones(free_bake.vectors_shape, np.float32)
-    assert light.around_nodes(surface, bright, every).vectors.any()
-    assert not light.around_nodes(surface, dark, every).vectors.any()
+    assert light.around_nodes(surface, [TexelSource(bright)], every).vectors.any()
+    assert not light.around_nodes(surface, [TexelSource(dark)], every).vectors.any()
+    assert not light.around_nodes(surface, [TexelSource(bright, (0.0, 0.0, 0.0))], every).vectors.any()
+
+
+def test_texels_show_the_visible_fraction_of_each_hard_shadow_light(free_bake, small_btf):
+    """The result is linear in the visible fractions, also for rays of one pixel on both sides of a shadow's edge."""
+    covers = find_btf_materials(terms_of(covered(free_bake, small_btf.record, scale=SCALE))).available
+    surface, view = free_bake.stored_scene, sight(free_bake)
+    vectors, gain = vectors_of(surface, TO_LIGHT), (0.5, 1.0, 2.0)
+    fractions = np.random.default_rng(3).random((2, len(view.gbuffer.directions))).astype(np.float32)
+
+    def relief(*sources):
+        out = np.full((len(view.gbuffer.directions), 3), 1e2, np.float32)
+        shade_texels(covers, surface, free_bake.positions, view, IncidentTexelLight(sources, TexelLight()), out)
+        return out - 1e2
+
+    dark = TexelSource(np.zeros_like(vectors))
+    whole = relief(TexelSource(vectors, gain), TexelSource(vectors, gain, np.zeros_like(fractions[0])))
+    actual = relief(dark, *(TexelSource(vectors, gain, each) for each in fractions))
+    centers = slice(len(view.gbuffer.directions) - len(view.gbuffer.owner))
+    np.testing.assert_allclose(actual[centers], fractions.sum(axis=0)[centers, None] * whole[centers], atol=2e-4)
+    assert np.abs(whole[centers]).max() > 0.01
 
 
 def test_compressed_outgoing_coefficients_are_accurate(free_bake, small_btf):
@@ -206,6 +243,39 @@ def test_a_free_camera_equals_a_fixed_view(free_bake, small_btf, tmp_path, monke
     mean = render_image(free_bake, "front", look_of)
     size = np.linalg.norm(expected)
     assert np.linalg.norm(actual - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
+
+
+def test_view_directions_see_the_relief(small_btf):
+    """Seen heights at the centers of texels are those of rays, within half a step; coarser levels store their means."""
+    whole = load_btf(small_btf.record.data)
+    relief, shears = texel_tables.compute_texel_tables(whole).relief, compute_shears(whole.grid)
+    rows, columns = whole.size
+    seen = relief.lowest + relief.step * relief.height.astype(np.float64)
+    for view, texel in ((0, 5), (3, 100), (40, 77), (80, 200), (80, 13)):
+        center = (np.array([texel % columns, texel // columns]) + 0.5) / [columns, rows]
+        expected = parallax_intersection_numpy(whole.height, center, shears[view].astype(np.float64))
+        assert seen[view, texel] == pytest.approx(expected, abs=0.51 * float(relief.step) + 1e-5)
+    finest = seen[:, : rows * columns].reshape(len(shears), rows, columns)
+    means = 0.25 * sum(finest[:, a::2, b::2] for a in (0, 1) for b in (0, 1))
+    second = seen[:, rows * columns : rows * columns * 5 // 4].reshape(means.shape)
+    np.testing.assert_allclose(second, means, atol=1.01 * relief.step)
+
+
+def test_relief_is_found_between_view_directions(small_btf):
+    """Where a stored view shows what a ray meets: near the point that a march along the ray finds."""
+    whole, rng = load_btf(small_btf.record.data), np.random.default_rng(5)
+    relief, shears, (rows, columns) = see_relief(whole, whole.levels), compute_shears(whole.grid), whole.size
+    found, missed = [], []
+    for uv, theta, phi in zip(rng.random((200, 2)), rng.uniform(0.2, 1.1, 200), rng.uniform(0, 6.28, 200), strict=True):
+        wo = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+        height = parallax_intersection_numpy(whole.height, uv, wo[:2] / wo[2])
+        view = interpolation_weights_numpy(whole.grid, wo[None])[0][0, 0]
+        change = (wo[:2] / wo[2] - shears[view]) * [1, -1]
+        seen = height_seen.py_func(relief, 0, view, *np.float32(uv), *np.float32(wo[:2] / wo[2]))
+        found.append(np.linalg.norm((seen - height) * change * [columns, rows]))
+        missed.append(np.linalg.norm(height * change * [columns, rows]))
+    assert np.median(found) < 0.1
+    assert np.mean(found) < 0.5 * np.mean(missed)
 
 
 def test_a_btf_is_weighted_next_to_other_terms(free_bake, small_btf, tmp_path):

@@ -10,7 +10,6 @@ import { materialOf } from "../../state/scene";
 import { selectedTerms } from "../../state/selection";
 import { hasFreeCamera } from "../../state/views";
 import { isBtfTerm } from "../../state/look";
-import { isClientRendering } from "../../session/clientRendering";
 import { useServerQuery } from "./useServerQuery";
 
 /** What free cameras draw of a term while they move. */
@@ -34,17 +33,11 @@ export function fitMessage(fit: ZernikeFitBody, isClient: boolean): string {
   return `${while_moving} ${count}${needed}.`;
 }
 
-/** Notes about the BTF or tri-planar mapping of a material; null without any. */
-export function coverText(material: string): string | null {
-  const isProjected = materialOf(material)?.is_projected === true;
-  const sentences = [
-    isProjected && "The object has no UVs: the texture is projected along the world axes (tri-planar, 1 m per repeat).",
-    hasFreeCamera.value &&
-      isClientRendering.value &&
-      "While the camera moves, this browser draws the average of all texels.",
-  ].filter(Boolean);
-  return sentences.length > 0 ? sentences.join(" ") : null;
-}
+/** Note about the tri-planar mapping of a material; null without. */
+export const coverText = (material: string): string | null =>
+  materialOf(material)?.is_projected === true
+    ? "The object has no UVs: the texture is projected along the world axes (tri-planar, 1 m per repeat)."
+    : null;
 
 const fetchFits = (query: string) => getZernikeFit(JSON.parse(query) as ZernikeFitRequest);
 

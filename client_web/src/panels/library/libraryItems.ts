@@ -8,6 +8,7 @@ import type { BtfBody, MaterialBody, MeasuredBody, Term } from "../../protocol";
 import { libraryOpen } from "../../state/panels";
 import { togglePanel } from "../../state/panelWidths";
 import { selectMaterial, selectedMaterial, selectedTerm, selectTerm } from "../../state/selection";
+import { formatBytes } from "../../ui/scale";
 import { reportErrors, showNote } from "../../ui/toasts";
 import { trackJobs, type Geometry, continueJob, importImages, makeFromMesh, generate } from "./btfJobs";
 
@@ -62,10 +63,11 @@ function measuredEntry({ id, name, thumbnail, terms, warnings }: MeasuredBody): 
   return { id, name, description, thumbnail, terms, model: MEASURED, group: null };
 }
 
-function btfEntry({ id, name, thumbnail, terms, synthetic, size, error }: BtfBody): LibraryEntry {
+function btfEntry({ id, name, thumbnail, terms, synthetic, size, error, memory_bytes }: BtfBody): LibraryEntry {
   const from = synthetic === null ? "measured" : "synthetic, rendered from geometry";
   const missed = (100 * (error.at(-1) ?? 0)).toFixed(1);
-  const description = `${name}, ${from}. ${size[1]}×${size[0]} texels, compression error ${missed} %.`;
+  const cost = `${formatBytes(memory_bytes)} of memory while it is used`;
+  const description = `${name}, ${from}. ${size[1]}×${size[0]} texels, compression error ${missed} %, ${cost}.`;
   return { id, name, description, thumbnail, terms, model: BTFS, group: null };
 }
 

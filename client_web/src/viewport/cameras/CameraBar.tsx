@@ -5,6 +5,7 @@ import {
   setRenderer,
   rendererChoice,
   isClientRendering,
+  TEXEL_SHADING_NOTE,
   tracesLobes,
   type RendererMode,
 } from "../../session/clientRendering";
@@ -26,7 +27,7 @@ const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This
 /** Chooses the renderer of camera motion. */
 function RendererSelect() {
   const serverTitle = usesTexelShading.value
-    ? "The server draws while the camera moves, because this look uses BTFs or tri-planar textures."
+    ? TEXEL_SHADING_NOTE
     : tracesLobes.value
       ? "The server draws while the camera moves, because polished materials are ray traced."
       : SERVER_TITLE;

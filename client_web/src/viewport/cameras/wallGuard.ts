@@ -130,12 +130,12 @@ export class WallGuard {
     const points = way.map(({ orbit }) => positionOf(orbit));
     const passed = way.filter((waypoint) => waypoint.length < (traveled as number)).length;
     const direction = lastDirection(points.slice(0, passed + 1));
-    const towards = normal === null ? 1 : Math.abs(dot(direction, normal as Triple));
+    const towards = normal === null ? 1 : Math.abs(dot(direction, normal));
     const stopped = poseAfter(way, Math.max(0, (traveled as number) - this.margin / Math.max(MIN_COSINE, towards)));
     const rest = subtract(points.at(-1) as Triple, positionOf(stopped));
     this.cancel();
     this.guarded.accept(stopped);
-    const along = normal === null ? rest : subtract(rest, scale(normal as Triple, dot(rest, normal as Triple)));
+    const along = normal === null ? rest : subtract(rest, scale(normal, dot(rest, normal)));
     if (slides && length(along) > MIN_SLIDE * length(rest)) this.move(translateOrbit(stopped, along));
     else this.guarded.stop({ material: material ?? "", direction });
   }

@@ -17,6 +17,7 @@ from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import NDArray
 
 from relume.core.simd import (
+    FAST,
     NUM,
     VECTOR,
     WORD,
@@ -43,7 +44,8 @@ from relume.live.free_camera.texel_brdf.coefficient_packing import (
 )
 
 _tuple: Any = types.UniTuple  # has no type annotations
-_TEXELS, _SIDES, _CORNERS, _CHANNELS = 4, 4, 3, 3
+NUM_VIEWS, TEXELS_PER_VIEW = 4, 8  # view directions of a ray; texels of each, of two levels
+_TEXELS, _CORNERS, _CHANNELS = 4, 3, 3
 _ORDERS = [int(order) for order in HAS_ORDER[:, :HALF].argmax(axis=0)]  # of the pairs of lanes of a channel
 _SECONDARY_LANES = [int(lane) for lane in COEFFICIENT_LANE[2 * HALF :]]  # of the second and third color axis
 _MAX_ORDER = max(_ORDERS)
@@ -51,12 +53,13 @@ _MAX_ORDER = max(_ORDERS)
 
 @untyped_intrinsic
 def add_texels(typing_context, weight, step, view, view_weight, first_view, texel, texel_weight, first, is_more, out):  # type: ignore[no-untyped-def]
-    """Sum the coefficients of four texels, interpolated between four view directions.
+    """Sum the coefficients of four texels of each of four view directions, interpolated between them.
 
     Args:
         typing_context: Numba's. weight: (V, texels, 24) int8. step: (V, 24) float32.
         view: view directions, int32. view_weight: float32. first_view: index of the first of the four.
-        texel: int32. texel_weight: float32. first: index of the first of the four.
+        texel: int32. texel_weight: float32. first: index of the first of the four of the first view direction; those
+            of the next ones lie `TEXELS_PER_VIEW` further on each.
         is_more: add to `out`, else overwrite it. out: (24,) float32
     """
 
@@ -67,26 +70,25 @@ def add_texels(typing_context, weight, step, view, view_weight, first_view, texe
             for kind, value in zip(signature.args, arguments, strict=True)
             if isinstance(kind, types.Array)
         )
-        locations = [builder.add(first, constant_index(k)) for k in range(_TEXELS)]
-        texel_indices = [builder.sext(texels.load(location), WORD) for location in locations]
-        texel_vectors = [broadcast(builder, texel_weights.load(location)) for location in locations]
-        locations = [builder.add(first_view, constant_index(k)) for k in range(_SIDES)]
-        sides = [builder.sext(views.load(location), WORD) for location in locations]
-        side_weights = [broadcast(builder, view_weights.load(location)) for location in locations]
         zero = ir.Constant(VECTOR, [0.0] * NUM)
-        for lane in map(constant_index, range(0, NUM_COEFFICIENTS, NUM)):
-            location, contributions = sums.vector_pointer(lane), []
-            for side, side_weight in zip(sides, side_weights, strict=True):
-                texel_sum = dot(
-                    builder,
-                    texel_vectors,
-                    [weights.load_int8_vector(side, texel_index, lane) for texel_index in texel_indices],
-                )
-                contributions.append(
-                    multiply(builder, multiply(builder, side_weight, steps.load_vector(side, lane)), texel_sum)
-                )
-            before = builder.select(is_more, builder.load(location, align=4), zero)
-            builder.store(sum_values(builder, [before, *contributions]), location, align=4)
+        lanes = [constant_index(lane) for lane in range(0, NUM_COEFFICIENTS, NUM)]
+        pointers = [sums.vector_pointer(lane) for lane in lanes]
+        totals = [builder.select(is_more, builder.load(pointer, align=4), zero) for pointer in pointers]
+        for k in range(NUM_VIEWS):  # view by view: the weights of all would not fit the registers
+            at = builder.add(first_view, constant_index(k))
+            side, side_weight = builder.sext(views.load(at), WORD), view_weights.load(at)
+            texel_indices, texel_vectors = [], []
+            for texel in range(_TEXELS):
+                at = builder.add(first, constant_index(TEXELS_PER_VIEW * k + texel))
+                texel_indices.append(builder.sext(texels.load(at), WORD))
+                weight = builder.fmul(side_weight, texel_weights.load(at), FAST)
+                texel_vectors.append(broadcast(builder, weight))
+            for i, lane in enumerate(lanes):
+                values = [weights.load_int8_vector(side, texel_index, lane) for texel_index in texel_indices]
+                texel_sum = multiply(builder, steps.load_vector(side, lane), dot(builder, texel_vectors, values))
+                totals[i] = sum_values(builder, [totals[i], texel_sum])
+        for pointer, total in zip(pointers, totals, strict=True):
+            builder.store(total, pointer, align=4)
         return context.get_dummy_value()
 
     range_types = types.int64, texel, texel_weight, types.int64, types.boolean

@@ -34,6 +34,7 @@ from relume.live.free_camera.texel_brdf.coefficient_packing import (
     NUM_FUNCTIONS,
     WIDTH,
 )
+from relume.live.free_camera.texel_brdf.seen_relief import SeenRelief, see_relief
 from relume.math.zernike import basis_functions
 
 F32 = NDArray[np.float32]
@@ -53,12 +54,14 @@ class TexelTables(NamedTuple):
         levels: mip levels that are stored, see `LocalPcaBtf`.
         weight: packed coefficients of each texel minus those of the mean, in steps. step: step of each coefficient.
         axes: orthonormal columns of the color space in which coefficients are packed.
+        relief: heights that the view directions see.
     """
 
     levels: Shaped[NDArray[np.int32], "levels 3"]
     weight: Shaped[NDArray[np.int8], "views texels 24"]
     step: Shaped[F32, "views 24"]
     axes: Shaped[F32, "3 3"]
+    relief: SeenRelief
 
 
 class BtfMaterial(NamedTuple):
@@ -159,7 +162,8 @@ def compute_texel_tables(pca_btf: LocalPcaBtf) -> TexelTables:
     axes, levels = _color_axes(pca_btf, mean, integrals), _fitting_levels(pca_btf)
     texels = int((levels[:, 1] * levels[:, 2]).sum())
     first, weights = int(pca_btf.levels[len(pca_btf.levels) - len(levels), 0]), (num_views, texels, NUM_COEFFICIENTS)
-    tables = TexelTables(levels, np.empty(weights, np.int8), np.empty((num_views, NUM_COEFFICIENTS), np.float32), axes)
+    steps, relief = np.empty((num_views, NUM_COEFFICIENTS), np.float32), see_relief(pca_btf, levels)
+    tables = TexelTables(levels, np.empty(weights, np.int8), steps, axes, relief)
     cluster, weight = pca_btf.cluster[:, first:], pca_btf.weight[:, first:]
 
     def weigh(start: int, stop: int) -> None:

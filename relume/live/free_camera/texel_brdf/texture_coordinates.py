@@ -23,15 +23,17 @@ from relume.transport.btf_kernel import mip_level
 F32 = NDArray[np.float32]
 
 _EPSILON = np.float32(1e-30)
+_FILTER_WIDTH = np.float32(2 / math.sqrt(3))  # gives one bilinear lookup, box and tent, the variance of the footprint
 _MAX_REPEATS = np.float32(1 << 30)  # repeats: beyond, float32 has no fraction of one
 
 BATCH_SIZE = 64  # rays; all their columns fit the L1 cache
-X, Y, N, SIDE, U, V, LEVEL, THETA, AZIMUTH = (BATCH_SIZE * k for k in (0, 3, 6, 9, 10, 11, 12, 13, 14))
+X, Y, N, SIDE, U, V, LEVEL, THETA, AZIMUTH, SHEAR = (BATCH_SIZE * k for k in (0, 3, 6, 9, 10, 11, 12, 13, 14, 29))
 """Offsets of the columns that `map_to_texture` writes: texture axes x and y and the normal, three columns each;
 handedness, −1 if the texture is mirrored, else 1; u and v as fractions of a repeat; mip level, see `texels_at_level`;
-θ, and azimuth as a fraction of a turn, of the view direction, see `interpolation_weights_at`."""
+θ, and azimuth as a fraction of a turn, of the view direction, see `interpolation_weights_at`; its parallax shear, two
+columns, see `relume.assets.btf.parallax`."""
 _TO1, _TO2, _OUTWARD, _UV_SCALE, _D, _UV, _DISTANCE = (BATCH_SIZE * k for k in (15, 17, 19, 22, 23, 26, 28))
-NUM_COLUMNS = 29
+NUM_COLUMNS = 31
 _FACE_COLUMNS = np.array([
     X, X + BATCH_SIZE, X + 2 * BATCH_SIZE, SIDE, U, V, _TO1, _TO1 + BATCH_SIZE, _TO2, _TO2 + BATCH_SIZE,
     _OUTWARD, _OUTWARD + BATCH_SIZE, _OUTWARD + 2 * BATCH_SIZE, _UV_SCALE,
@@ -176,7 +178,7 @@ def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
+def repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
     """Return the fraction of a repeat; written out, because floor would be a call."""
     clamped = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
     fraction = np.float32(clamped - np.float32(np.int32(clamped)))
@@ -184,7 +186,7 @@ def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, finest):  # type: ignore[no-untyped-def]
+def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, finest, max_slope):  # type: ignore[no-untyped-def]
     """Compute where gathered rays hit their texture, and its frame there.
 
     Args:
@@ -192,6 +194,7 @@ def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, 
             rays.
         pixel_angle: angle of a pixel, radians. rotation: cosine and sine of the texture's rotation.
         scale: repeats per unit of texture coordinates. finest: side of the finest mip level, texels.
+        max_slope: largest parallax shear.
     """
     _tangent_frames(columns)
     _project_uv(columns, camera_position, num)
@@ -209,10 +212,13 @@ def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, 
         view_cosine = dot(get_vector(columns, _OUTWARD, j), d)
         footprint = scale * texture_footprint(columns[_DISTANCE + j], pixel_angle, columns[_UV_SCALE + j], view_cosine)
         columns[U + j], columns[V + j] = (
-            _repeat_fraction(scale * (c * u - s * v)),
-            _repeat_fraction(scale * (s * u + c * v)),
+            repeat_fraction(scale * (c * u - s * v)),
+            repeat_fraction(scale * (s * u + c * v)),
         )
-        columns[LEVEL + j] = mip_level(footprint, finest)
-        columns[THETA + j], columns[AZIMUTH + j] = acos_clamped(-dot(d, n)), azimuth_fraction(-dot(d, x), -dot(d, y))
+        columns[LEVEL + j] = mip_level(_FILTER_WIDTH * footprint, finest)
+        wx, wy, wz = -dot(d, x), -dot(d, y), -dot(d, n)
+        columns[THETA + j], columns[AZIMUTH + j] = acos_clamped(wz), azimuth_fraction(wx, wy)
+        inverse = np.float32(1) / max(wz, math.sqrt(wx * wx + wy * wy) / max_slope, _EPSILON)
+        columns[SHEAR + j], columns[SHEAR + BATCH_SIZE + j] = inverse * wx, inverse * wy
         _set_vector(columns, X, j, x)
         _set_vector(columns, Y, j, y)

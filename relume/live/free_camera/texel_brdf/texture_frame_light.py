@@ -9,6 +9,7 @@ A rotation of the tangent frame by δ about the normal changes the coefficients 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numba as nb
@@ -30,17 +31,34 @@ _EPSILON = np.float32(1e-12)
 _NO_VECTORS = np.empty((0, 3), np.float32)
 
 
+class TexelSource(NamedTuple):
+    """Incident radiance of a light source, or of several.
+
+    Attributes:
+        vectors: coefficients at probes, never written to. gain: per channel.
+        visibility: visible fraction along each ray, for a hard-shadow light; None: in the coefficients.
+    """
+
+    vectors: Shaped[F32, "probes 3 functions"]
+    gain: tuple[float, ...] = (1.0, 1.0, 1.0)
+    visibility: Shaped[F32, " rays"] | None = None
+
+    def has_equal_light(self, other: TexelSource | None) -> bool:
+        """Return whether both have the same coefficients, times equal gains."""
+        return other is not None and self.vectors is other.vectors and self.gain == other.gain
+
+
 class NodeLight(NamedTuple):
     """Incident radiance at lattice nodes.
 
     Attributes:
         tangent: approximately unit; azimuths count from it.
-        vectors: coefficients of the first basis functions, in lanes: the cosine parts of the three channels, then their
-            sine parts.
+        vectors: coefficients of the first basis functions for each source, in lanes: the cosine parts of the three
+            channels, then their sine parts.
     """
 
     tangent: Shaped[F32, "nodes 3"]
-    vectors: Shaped[F32, "nodes lanes"]
+    vectors: Shaped[F32, "sources*nodes lanes"]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
@@ -85,14 +103,14 @@ def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[n
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _fill_lanes(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
-    """Copy the coefficients of probes rows[start:stop] into lanes. out: (probes, 3 F)"""
+def _fill_lanes(vectors, gain, rows, start, stop, out):  # type: ignore[no-untyped-def]
+    """Copy the coefficients of probes rows[start:stop] into lanes, times a gain. out: (probes, 3 F)"""
     for p in rows[start:stop]:
         for channel in range(3):
             for i in range(WIDTH):
                 if i != EMPTY_LANE:  # that lane stays zero
                     lane = i if i < HALF else PAIRS - HALF + i
-                    out[p, channel * HALF + lane] = vectors[p, channel, FUNCTIONS[i]]
+                    out[p, channel * HALF + lane] = gain[channel] * vectors[p, channel, FUNCTIONS[i]]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -126,13 +144,10 @@ class TexelLight:
     """Cached incident radiance at lattice nodes, and texture placements; used from one thread at a time."""
 
     def __init__(self) -> None:
-        self._vectors: F32 | None = None
         self._texture_placements: F32 | None = None
-        self._lanes, self._node_light, self._is_current = (
-            _NO_VECTORS,
-            NodeLight(_NO_VECTORS, _NO_VECTORS),
-            np.empty(0, np.uint8),
-        )
+        self._sources: list[TexelSource | None] = []
+        self._lanes, self._tangent, self._vectors = _NO_VECTORS, _NO_VECTORS, np.empty((0, 0, 3), np.float32)
+        self._is_current = np.empty((0, 0), np.uint8)
 
     def texture_placements(self, stored_scene: StoredScene, positions: F32) -> F32:
         """Return the placements of the triangles' textures, computed once.
@@ -145,30 +160,41 @@ class TexelLight:
         return self._texture_placements
 
     def around_nodes(
-        self, stored_scene: StoredScene, vectors: Shaped[F32, "probes 3 functions"], is_requested: Shaped[U8, " nodes"]
+        self, stored_scene: StoredScene, sources: Sequence[TexelSource], is_requested: Shaped[U8, " nodes"]
     ) -> NodeLight:
-        """Return the incident radiance at lattice nodes; computed nodes stay cached as long as `vectors` is the same
-        array.
+        """Return the incident radiance at lattice nodes; computed nodes stay cached while a source stays the same.
 
         Args:
-            stored_scene: has the nodes and probes. vectors: coefficients of probes, never written to.
+            stored_scene: has the nodes and probes. sources: the light; their visibility does not count.
             is_requested: nodes to compute; the rows of others are arbitrary.
         """
-        if vectors is not self._vectors:
-            if len(self._is_current) != len(is_requested):
-                num_nodes = len(is_requested)
-                self._lanes = np.zeros((len(vectors), 3 * WIDTH), np.float32)
-                self._node_light = NodeLight(
-                    np.zeros((num_nodes, 3), np.float32), np.zeros((num_nodes, 3 * WIDTH), np.float32)
-                )
-            self._vectors, self._is_current = vectors, np.zeros_like(is_requested)
-        rows = np.flatnonzero(is_requested & ~self._is_current)
-        if len(rows):
-            is_needed = np.zeros(len(vectors), np.uint8)
-            mark_needed_probes(stored_scene.lattice_nodes, is_requested, is_needed)
-            probes = np.flatnonzero(is_needed)
-            parallel_for_chunks(lambda start, stop: _fill_lanes(vectors, probes, start, stop, self._lanes), len(probes))
-            args = (stored_scene.lattice_nodes, stored_scene.probes.tangent, self._lanes, rows)
-            parallel_for_chunks(lambda start, stop: _sum_at_nodes(*args, start, stop, *self._node_light), len(rows))
-            self._is_current[rows] = 1
-        return self._node_light
+        shape = len(sources), len(is_requested)
+        if self._is_current.shape != shape:
+            self._lanes = np.zeros((stored_scene.probes.num_points, 3 * WIDTH), np.float32)
+            self._tangent, self._vectors = (
+                np.zeros((shape[1], 3), np.float32),
+                np.zeros((*shape, 3 * WIDTH), np.float32),
+            )
+            self._is_current, self._sources = np.zeros(shape, np.uint8), [None] * shape[0]
+        for k, source in enumerate(sources):
+            if not source.has_equal_light(self._sources[k]):
+                self._sources[k], self._is_current[k] = source._replace(visibility=None), 0
+            rows = np.flatnonzero(is_requested & ~self._is_current[k])
+            if len(rows):
+                self._interpolate(stored_scene, source, rows, self._vectors[k])
+                self._is_current[k, rows] = 1
+        return NodeLight(self._tangent, self._vectors.reshape(-1, 3 * WIDTH))
+
+    def _interpolate(
+        self, stored_scene: StoredScene, source: TexelSource, rows: NDArray[np.intp], out: Shaped[F32, "nodes lanes"]
+    ) -> None:
+        """Interpolate the coefficients of a source at some nodes, and write their tangents."""
+        is_row, is_needed = np.zeros(len(out), np.uint8), np.zeros(len(source.vectors), np.uint8)
+        is_row[rows] = 1
+        mark_needed_probes(stored_scene.lattice_nodes, is_row, is_needed)
+        probes, gain = np.flatnonzero(is_needed), np.array(source.gain, np.float32)
+        parallel_for_chunks(
+            lambda start, stop: _fill_lanes(source.vectors, gain, probes, start, stop, self._lanes), len(probes)
+        )
+        args = stored_scene.lattice_nodes, stored_scene.probes.tangent, self._lanes, rows
+        parallel_for_chunks(lambda start, stop: _sum_at_nodes(*args, start, stop, self._tangent, out), len(rows))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
+from relume.assets.btf.btf_memory import memory_bytes
 from relume.assets.btf.btf_store import STORE, BtfRecord, get_record, records
 from relume_server.api.assets.in_use import remove_unused
 from relume_server.api.assets.materials import complete_terms, render_thumbnail
@@ -59,4 +60,5 @@ def _body(record: BtfRecord) -> BtfBody:
         components=record.components,
         error=record.error,
         ratio=record.ratio,
+        memory_bytes=memory_bytes(record.size, record.directions, record.clusters, record.components),
     )
