@@ -181,7 +181,7 @@ def _apply_btf(transfer: Any, picture: Picture | FreeCameraPicture, folder: Path
     source.write_text("grey")
     gray = LocalPcaBtf(
         grid, np.array([[0, 2, 2], [4, 1, 1]], np.int32), np.zeros((5, 5), np.uint8), np.zeros((5, 5, 1), np.int8),
-        np.array([2], np.uint8), np.full((5, 1, 5, 3), 0.1, np.float16), np.zeros((5, 1, 1, 5, 3), np.int8),
+        np.full((5, 1, 5, 3), 0.1, np.float16), np.zeros((5, 1), np.float32), np.zeros((5, 1, 1, 5, 3), np.int8),
         np.ones((5, 1, 1), np.float32), np.full((5, 5, 3), 0.1, np.float32),
         np.zeros((1, 1), np.float32), (0.0, 0.0),
     )  # fmt: skip
