@@ -135,6 +135,9 @@ def stack_views(
 ) -> LocalPcaBtf:
     """Stack the views; those with fewer clusters are padded.
 
+    Args:
+        images: the BTF. compressed_views: all views. height: of the relief, in side lengths of the texture.
+        shared: what all views share, if they do.
     Raises:
         MaterialError: the BTF is black.
     """

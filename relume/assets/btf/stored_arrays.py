@@ -42,6 +42,8 @@ def to_arrays(btf: LocalPcaBtf) -> Arrays:
 def from_arrays(arrays: Mapping[str, NDArray[Any]], grid: DirectionGrid, error: tuple[float, ...]) -> LocalPcaBtf:
     """Invert `to_arrays`.
 
+    Args:
+        arrays: by name. grid: grid of the directions. error: relative RMS by the number of components.
     Raises:
         ValueError, KeyError, IndexError: the arrays are inconsistent.
     """

@@ -98,21 +98,21 @@ def project_brdfs(load_span: Callable[[int], Span], source: Shaped[I32, "V texel
     """
     (num_views, texels), rng = source.shape, np.random.default_rng(SEED)
     sampled = np.sort(rng.choice(texels, min(texels, _NUM_BASIS_TEXELS), replace=False))
-    parts = [
+    sampled_rows = [
         (hits @ span.z)[sampled] / np.maximum(count[sampled, None], 1)
         for span, hits, count in _gathered(load_span, source)
     ]
-    basis = leading_components(np.concatenate(parts, axis=1), _SPAN)
-    ends = np.cumsum([0, *(part.shape[1] for part in parts)])
-    del parts
+    basis = leading_components(np.concatenate(sampled_rows, axis=1), _SPAN)
+    ends = np.cumsum([0, *(rows.shape[1] for rows in sampled_rows)])
+    del sampled_rows
     rank = max(1, len(basis))
     basis = basis if len(basis) else np.zeros((1, ends[-1]), np.float32)
     projected, counts = np.zeros((texels, rank), np.float32), np.empty((num_views, texels), np.float32)
     grams, deviation_energy, outside, energy = np.empty((num_views, rank, rank), np.float32), 0.0, 0.0, 0.0
     for view, (span, hits, count) in enumerate(_gathered(load_span, source)):
-        part = basis[:, ends[view] : ends[view + 1]]
-        projected += (hits @ span.z) @ part.T
-        grams[view], counts[view] = part @ part.T, count
+        view_basis = basis[:, ends[view] : ends[view + 1]]
+        projected += (hits @ span.z) @ view_basis.T
+        grams[view], counts[view] = view_basis @ view_basis.T, count
         deviation_energy += sum_squares(span.z)
         outside += span.residual
         energy += span.energy
@@ -204,31 +204,31 @@ def _weights(z: F32, clusters: Clusters) -> _Weights:
     return _Weights(clusters.cluster_index, weight, energy, count)
 
 
-def _is_kept(brdfs: WholeBrdfs, weights: _Weights, step: float) -> NDArray[np.bool_]:
+def _is_used(brdfs: WholeBrdfs, weights: _Weights, step: float) -> NDArray[np.bool_]:
     """Components that explain more than rounding them would add. (K, C)"""
     return np.asarray(weights.energy > (brdfs.values + weights.count[:, None]) * step**2 / 12)
 
 
 def _error(brdfs: WholeBrdfs, weights: _Weights, floor: float, step: float) -> float:
     """Estimated squared error after rounding by δ."""
-    kept = _is_kept(brdfs, weights, step)
-    rounded = brdfs.values * (kept.sum() + (weights.count > 0).sum()) + (kept * weights.count[:, None]).sum()
-    return float(floor + weights.energy[~kept].sum() + rounded * step**2 / 12)
+    used = _is_used(brdfs, weights, step)
+    rounded = brdfs.values * (used.sum() + (weights.count > 0).sum()) + (used * weights.count[:, None]).sum()
+    return float(floor + weights.energy[~used].sum() + rounded * step**2 / 12)
 
 
 def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> Plan:
     """Round weights by δ, and estimate the bytes."""
-    kept = _is_kept(brdfs, weights, step)
+    used = _is_used(brdfs, weights, step)
     largest = np.zeros(weights.energy.shape, np.float32)
     np.maximum.at(largest, weights.index, np.abs(weights.weight))
     weight_step = np.maximum(np.float32(step), largest / INT8_MAX)
-    codes = np.rint(weights.weight / weight_step[weights.index]).astype(np.int8) * kept[weights.index]
-    eigen_step = np.where(kept, step / np.sqrt(np.maximum(weights.energy, 1e-30)), 0).astype(np.float32)
+    codes = np.rint(weights.weight / weight_step[weights.index]).astype(np.int8) * used[weights.index]
+    eigen_step = np.where(used, step / np.sqrt(np.maximum(weights.energy, 1e-30)), 0).astype(np.float32)
     table_bits = 0.5 * np.log2(1 + _BITS_OF_NOISE * weights.energy / (brdfs.values * step**2))
     weight_bits = [bits_per_symbol(column.astype(int) + INT8_MAX) for column in codes.T]
     texel_bits = bits_per_symbol(weights.index) + sum(weight_bits)
-    size = (brdfs.values * table_bits[kept].sum() + len(codes) * texel_bits) / 8
-    num = int(kept.any(axis=0).sum())
+    size = (brdfs.values * table_bits[used].sum() + len(codes) * texel_bits) / 8
+    num = int(used.any(axis=0).sum())
     return Plan(
         weights.index.astype(np.uint8),
         np.ascontiguousarray(codes[:, :num]),
