@@ -34,7 +34,7 @@ class SyntheticBtf:
         self.name = name
         # like `relume material make-btf` up to 128 texels a side; then as many rays
         size, self.grid = (8, 1) if tiny else (size, min(3, max(1, 384 // size)))
-        tile = {**GEOMETRIES, **FLAT_MATERIALS}[name]()
+        tile = GEOMETRIES[name]() if name in GEOMETRIES else FLAT_MATERIALS[name](size)
         small = TileGeometry(tile, ubo_grid(), (size, size), self.grid, 1)
         self.values = ValueFile(folder / f"{name}-{size}", ubo_grid(), (size, size))
         self.values.fill(small.get_view, lambda share: None, lambda: False)

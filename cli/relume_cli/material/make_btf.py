@@ -40,6 +40,7 @@ def material_make_btf(
     resumes.
     """
     from relume.assets.asset_store import check_name
+    from relume.core.errors import ParameterError
     from relume.synthetic_btf.from_images import ImageTile
     from relume.synthetic_btf.synthesize import GEOMETRIES, IMAGES, MESH, SyntheticBtf, synthesize_btf
     from relume_cli.data_folder import open_settings
@@ -49,7 +50,7 @@ def material_make_btf(
 
     images = None if height is None and color is None else ImageTile(height, color, relief, roughness)
     if (geometry is None) == (images is None):
-        raise typer.BadParameter("give either a geometry, or --height and --color")
+        raise ParameterError("geometry", geometry, "either a geometry, or images by --height and --color")
     file = None if geometry is None or geometry in GEOMETRIES or not Path(geometry).suffix else Path(geometry)
     kind = IMAGES if geometry is None else geometry if file is None else MESH
     request = SyntheticBtf(kind, size, grid, error, file, period, images)

@@ -224,6 +224,9 @@ def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys)
     assert "relative RMS" in words
     assert main(["material", "make-btf", "wool", "--data", str(data)]) == 1
     assert "weave, pebbles, corduroy" in capsys.readouterr().err
+    for both_or_none in (["weave", "--color", "print.png"], []):
+        assert main(["material", "make-btf", *both_or_none, "--data", str(data)]) == 1
+        assert "images by --height and --color" in capsys.readouterr().err
     settings = Settings(data=data, client=tmp_path / "client", allowed_hosts=["testserver"])
     with TestClient(create_app(settings)) as client:
         (listed,) = client.get("/api/materials/btf").json()
