@@ -173,11 +173,12 @@ def make_plan(brdfs: WholeBrdfs, bound: float, poll: Callable[[], object]) -> Pl
 
 
 class _Weights(NamedTuple):
-    """Exact weights, Σ α² of each cluster and component, and members of each cluster."""
+    """Exact weights, Σ α² of each cluster and component, n |M|² and members n of each cluster."""
 
     index: NDArray[np.intp]
     weight: F32
     energy: F64
+    mean_energy: F64
     count: F64
 
 
@@ -201,7 +202,8 @@ def _weights(z: F32, clusters: Clusters) -> _Weights:
         members = clusters.cluster_index == k
         weight[members] = (z[members] - clusters.mean[k]) @ clusters.components[k].T
         energy[k], count[k] = np.square(weight[members], dtype=np.float64).sum(axis=0), members.sum()
-    return _Weights(clusters.cluster_index, weight, energy, count)
+    mean_energy = count * np.square(clusters.mean, dtype=np.float64).sum(axis=1)
+    return _Weights(clusters.cluster_index, weight, energy, mean_energy, count)
 
 
 def _is_used(brdfs: WholeBrdfs, weights: _Weights, step: float) -> NDArray[np.bool_]:
@@ -224,10 +226,11 @@ def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> Plan:
     weight_step = np.maximum(np.float32(step), largest / INT8_MAX)
     codes = np.rint(weights.weight / weight_step[weights.index]).astype(np.int8) * used[weights.index]
     eigen_step = np.where(used, step / np.sqrt(np.maximum(weights.energy, 1e-30)), 0).astype(np.float32)
-    table_bits = 0.5 * np.log2(1 + _BITS_OF_NOISE * weights.energy / (brdfs.values * step**2))
+    table_energy = np.append(weights.energy[used], weights.mean_energy)
+    table_bits = 0.5 * np.log2(1 + _BITS_OF_NOISE * table_energy / (brdfs.values * step**2))
     weight_bits = [bits_per_symbol(column.astype(int) + INT8_MAX) for column in codes.T]
     texel_bits = bits_per_symbol(weights.index) + sum(weight_bits)
-    size = (brdfs.values * table_bits[used].sum() + len(codes) * texel_bits) / 8
+    size = (brdfs.values * table_bits.sum() + len(codes) * texel_bits) / 8
     num = int(used.any(axis=0).sum())
     return Plan(
         weights.index.astype(np.uint8),
