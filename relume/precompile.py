@@ -23,7 +23,7 @@ import numpy as np
 
 from relume.assets.btf.btf_store import STORE, store_btf
 from relume.assets.btf.direction_rings import make_direction_grid
-from relume.assets.btf.local_pca_btf import LocalPcaBtf
+from relume.assets.btf.local_pca_btf import LocalPcaBtf, SharedTexels
 from relume.assets.measured.interpolate import NUM_KNOTS, QuotientKind, measured_over_model
 from relume.brdf.parameter_sweep import curves_of_parameter
 from relume.brdf.registry import TERMS
@@ -181,9 +181,10 @@ def _apply_btf(transfer: Any, picture: Picture | FreeCameraPicture, folder: Path
     source.write_text("grey")
     gray = LocalPcaBtf(
         grid, np.array([[0, 2, 2], [4, 1, 1]], np.int32), np.zeros((5, 5), np.uint8), np.zeros((5, 5, 1), np.int8),
-        np.array([2], np.uint8), np.full((5, 1, 5, 3), 0.1, np.float16), np.zeros((5, 1, 1, 5, 3), np.int8),
+        np.full((5, 1, 5, 3), 0.1, np.float16), np.zeros((5, 1), np.float32), np.zeros((5, 1, 1, 5, 3), np.int8),
         np.ones((5, 1, 1), np.float32), np.full((5, 5, 3), 0.1, np.float32),
-        np.zeros((1, 1), np.float32), (0.0, 0.0),
+        np.array([[0, 0.01], [0, 0]], np.float32), (0.0, 0.0),
+        SharedTexels(np.zeros(4, np.uint8), np.zeros((4, 1), np.int8)),
     )  # fmt: skip
     with STORE.with_search_folder(folder / "btfs"):
         terms = store_btf(folder / "btfs", source, "Grey", None, lambda: gray).terms()

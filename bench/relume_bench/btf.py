@@ -1,108 +1,145 @@
-"""btf.compression_*: error, ratio and time of BTF compression.
+"""btf.compression_*: error, ratio and time of BTF compression, both coders side by side.
 
-`btf.compression_error`: relative RMS of all values after compression and rounding at 1/50 byte per channel and image;
-the worst of the three synthetic BTFs. `curve` in the context: ratio and error for three error bounds, each with
-decreasing numbers of components; interpolated linearly in logarithms between the best points. In parentheses: the error
-of the ideal coder at the same size, without its tables. Norm: √Σ(compressed − original)² ÷ √Σ original²; `range_error`
-divides by the RMS of the brightest thousandth instead, as for errors of 8-bit images; `delta_e` is the mean color
-difference (CIE 1976) of texels in full light at that ratio. `btf.compression_ratio`: at an error of 5 %.
-`btf.compression_s`: time of the slowest of the three to 5 %.
+Six synthetic BTFs: three reliefs (weave, pebbles, corduroy) and three flat materials of images (felt, leather, print),
+256 × 256 texels, or as many as the environment variable RELUME_BTF_TEXELS says.
+
+`btf.compression_error`: relative RMS of all values after compression and rounding at 1/50 byte per channel and image,
+√Σ(compressed − original)² ÷ √Σ original², the better coder; the worst relief. `btf.compression_flat_error`: the worst
+flat material. The context has both coders for each material in four norms, since Müller 2004 states none: `linear`, the
+one above; `energy`, its square; `srgb`, RMS of 8-bit sRGB values over 255, of radiance over that of a matte white
+surface in the same light; `delta_e`, mean CIE 1976 color difference for the same white. Further: `ratio`; `memory_mb`
+of the arrays and tables while rendering; `ideal`, the relative RMS of the ideal coder of single views at that ratio,
+without its tables, which bounds no coder that uses several views. `btf.compression_ratio`: at an error of 5 %, reliefs.
+`btf.compression_s`: time of the slowest relief to 5 %.
 """
 
 from __future__ import annotations
 
+import tempfile
 import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.assets.btf.compress import Coders
 from relume.assets.btf.local_pca_btf import LocalPcaBtf
+from relume.assets.btf.partial_results import PartialCompression
+from relume.assets.btf.stored_arrays import stored_bytes
 from relume.assets.btf.value_cache import ValueFile
+from relume.core.color import srgb_encode
+from relume.core.memory_usage import live_bytes
 from relume.synthetic_btf.synthesize import GEOMETRIES
-from relume_bench.btf_synthetic import SyntheticBtf, open_values_folder
+from relume_bench.btf_flat import FLAT_MATERIALS
+from relume_bench.btf_synthetic import SyntheticBtf, compression_texels, open_values_folder
 from relume_bench.figure import Figure
 
-_BOUNDS = (0.05, 0.1, 0.2)
 _AT_RATIO, _AT_ERROR = 50.0, 0.05
-_RATIOS = (12.5, 25.0, _AT_RATIO, 100.0, 150.0)  # compared with the ideal coder's
+_LEAST_BOUND, _MOST_BOUND = 0.005, 0.5
+_TRIALS = 4  # compressions per coder; each halves the interval of bounds, as a ratio
 _SOME_TEXELS = 200
 _TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])  # ITU-R BT.709-6
 
 
-class _Curve(NamedTuple):
-    """Rate-distortion curve of one BTF: ratios and errors; seconds to the first bound; of_range: see the module."""
+class _Compression(NamedTuple):
+    """The smallest error of a coder at the ratio: relative RMS, and the figures of the context."""
 
-    samples: list[tuple[float, float]]
-    seconds: float
-    range_error: float
-    delta_e: float
-    least: list[float]
-
-    @property
-    def _best(self) -> NDArray[np.float64]:
-        """Pareto-optimal points, logarithms, ratios and errors increasing. (2, n)"""
-        best: list[tuple[float, float]] = []
-        for ratio, error in sorted(self.samples, reverse=True):
-            if not best or error < best[-1][1]:
-                best.append((ratio, error))
-        return np.asarray(np.log(best[::-1]).T)
-
-    @property
-    def errors(self) -> list[float]:
-        """Errors at `_RATIOS`; beyond the measured range its last value."""
-        ratio, error = self._best
-        return [float(log_error) for log_error in np.exp(np.interp(np.log(_RATIOS), ratio, error))]
-
-    @property
-    def error(self) -> float:
-        return self.errors[_RATIOS.index(_AT_RATIO)]
-
-    @property
-    def ratio(self) -> float:
-        ratio, error = self._best
-        return float(np.exp(np.interp(np.log(_AT_ERROR), error, ratio)))
+    error: float
+    figures: dict[str, float]
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Make the three BTFs, and compress each for several bounds."""
+    """Make the BTFs, and compress each by both coders."""
     with open_values_folder(tiny) as values_folder:
-        synthetic_btfs = {name: SyntheticBtf(name, values_folder, tiny) for name in GEOMETRIES}
-        curves = {name: _curve(btf) for name, btf in synthetic_btfs.items()}
-    first = synthetic_btfs["weave"]
+        btfs = {name: SyntheticBtf(name, values_folder, tiny, compression_texels()) for name in _names()}
+        results = {name: _compare_coders(btf) for name, btf in btfs.items()}
+        relief_times = [_time(btfs[name]) for name in GEOMETRIES]
     context = {
-        "texels": "×".join(map(str, first.values.size)),
-        "places_a_texel": first.grid**2,
-        "curves": _describe(curves),
+        "texels": "×".join(map(str, btfs["weave"].values.size)),
+        "places_a_texel": {name: btf.grid**2 for name, btf in btfs.items()},
+        "coders": {
+            name: {coder: result.figures if result else None for coder, result in by_coder.items()}
+            for name, by_coder in results.items()
+        },
+    }
+    best = {
+        name: min((result.error for result in by_coder.values() if result), default=1.0)
+        for name, by_coder in results.items()
     }
     return [
-        Figure("btf.compression_error", 100 * max(btf.error for btf in curves.values()), "%", context),
-        Figure("btf.compression_ratio", min(btf.ratio for btf in curves.values()), "× smaller", context),
-        Figure("btf.compression_s", max(btf.seconds for btf in curves.values()), "s", context),
+        Figure("btf.compression_error", 100 * max(best[name] for name in GEOMETRIES), "%", context),
+        Figure("btf.compression_flat_error", 100 * max(best[name] for name in FLAT_MATERIALS), "%", context),
+        Figure("btf.compression_ratio", min(ratio for _, ratio in relief_times), "× smaller", context),
+        Figure("btf.compression_s", max(seconds for seconds, _ in relief_times), "s", context),
     ]
 
 
-def _curve(btf: SyntheticBtf) -> _Curve:
-    samples, start_time, seconds, values = [], time.perf_counter(), 0.0, btf.values
-    smallest: tuple[float, LocalPcaBtf] | None = None
-    for bound in _BOUNDS:
-        uncompressed = btf.compress(bound)
-        seconds = seconds or time.perf_counter() - start_time
-        for num in range(uncompressed.num_components + 1):
-            bounds = uncompressed.with_components(num)
-            ratio = bounds.measured_bytes / bounds.num_bytes
-            samples.append((ratio, bounds.error[-1]))
-            if ratio >= _AT_RATIO and (smallest is None or bounds.error[-1] < smallest[0]):
-                smallest = bounds.error[-1], bounds
-    sample = np.concatenate([values.get_view(view).ravel()[::7] for view in range(0, 81, 8)]).astype(np.float64)
-    brightest = np.sort(sample)[-max(1, len(sample) // 1000) :]
-    to_range = float(np.sqrt(np.mean(sample**2)) / np.sqrt(np.mean(brightest**2)))
-    delta_e = float("nan") if smallest is None else _delta_e(values, smallest[1])
-    return _Curve(samples, seconds, to_range, delta_e, _estimate_energy_bound(values))
+def _names() -> tuple[str, ...]:
+    return *GEOMETRIES, *FLAT_MATERIALS
 
 
-def _estimate_energy_bound(values: ValueFile) -> list[float]:
-    """Error of the ideal coder with as many bits, relative RMS, at each of `_RATIOS`: reverse water-filling.
+def _time(btf: SyntheticBtf) -> tuple[float, float]:
+    """Seconds of a compression to `_AT_ERROR`, and its ratio."""
+    start_time = time.perf_counter()
+    compressed = btf.compress(_AT_ERROR)
+    return time.perf_counter() - start_time, compressed.measured_bytes / stored_bytes(compressed)
+
+
+def _compare_coders(btf: SyntheticBtf) -> dict[str, _Compression | None]:
+    """Both coders at `_AT_RATIO`."""
+    with tempfile.TemporaryDirectory() as folder:
+        partial = PartialCompression(Path(folder), {})
+        coders = Coders(btf.values, btf.height, lambda fraction: None, lambda: False, partial)
+        ideal = _estimate_energy_bound(btf.values)
+        return {
+            name: _at_ratio(compress_to, btf.values, ideal)
+            for name, compress_to in (("per_view", coders.per_view), ("whole_brdfs", coders.whole_brdfs))
+        }
+
+
+def _at_ratio(
+    compress_to: Callable[[float], LocalPcaBtf | None], values: ValueFile, ideal: float
+) -> _Compression | None:
+    """Search the bound with the smallest error at `_AT_RATIO`."""
+    best: tuple[LocalPcaBtf, float] | None = None
+    low, high = np.log((_LEAST_BOUND, _MOST_BOUND))
+    for _ in range(_TRIALS):
+        middle = 0.5 * (low + high)
+        compressed = compress_to(float(np.exp(middle)))
+        if compressed is None:  # the bound is out of reach
+            low = middle
+            continue
+        trials = [compressed.with_components(num) for num in range(compressed.num_components + 1)]
+        ratios = [trial.measured_bytes / stored_bytes(trial) for trial in trials]
+        for trial, ratio in zip(trials, ratios, strict=True):
+            if ratio >= _AT_RATIO and (best is None or trial.error[-1] < best[0].error[-1]):
+                best = trial, ratio
+        low, high = (low, middle) if ratios[-1] >= _AT_RATIO else (middle, high)
+    return None if best is None else _describe(values, *best, ideal)
+
+
+def _describe(values: ValueFile, compressed: LocalPcaBtf, ratio: float, ideal: float) -> _Compression:
+    error = compressed.error[-1]
+    texels = np.linspace(0, compressed.size[0] * compressed.size[1] - 1, _SOME_TEXELS).astype(int)
+    decoded = np.stack([compressed.texel_brdf(texel) for texel in texels], axis=2)
+    exact = np.stack([values.get_view(view)[:, texels] for view in range(len(decoded))])
+    encoded, exact_encoded = (np.rint(255 * srgb_encode(np.clip(np.pi * each, 0, 1))) for each in (decoded, exact))
+    srgb = float(np.sqrt(np.mean((encoded - exact_encoded) ** 2)) / 255)
+    delta_e = float(np.linalg.norm(_to_lab(decoded) - _to_lab(exact), axis=-1).mean())
+    return _Compression(
+        error,
+        {
+            "linear": error, "energy": error**2, "srgb": srgb, "delta_e": delta_e, "ratio": ratio,
+            "clusters": compressed.mean.shape[1], "components": compressed.num_components,
+            "memory_mb": (live_bytes(compressed) + compressed.tables().nbytes) / 1e6, "ideal": ideal,
+        },
+    )  # fmt: skip
+
+
+def _estimate_energy_bound(values: ValueFile) -> float:
+    """Error of the ideal coder of single views at `_AT_RATIO`, relative RMS: reverse water-filling.
 
     For independent Gaussian components of variances λ, R bits per texel leave Σ min(λ, θ) with R = Σ max(0, ½ log₂
     λ/θ). Components are the principal ones of each view, bits are shared between views, tables are free.
@@ -117,16 +154,8 @@ def _estimate_energy_bound(values: ValueFile) -> list[float]:
     level = np.geomspace(variance.min(), variance.max(), 4000)
     bits = np.array([0.5 * np.log2(np.maximum(variance / threshold, 1)).sum() for threshold in level])
     residual = np.array([np.minimum(variance, threshold).sum() for threshold in level])
-    target_bits = 8 * 3 * values.grid.num_directions**2 / np.array(_RATIOS)  # bits of all views per texel
-    return [float(threshold) for threshold in np.sqrt(np.interp(target_bits, bits[::-1], residual[::-1]) / energy)]
-
-
-def _delta_e(values: ValueFile, compressed: LocalPcaBtf) -> float:
-    """Mean color difference of some texels over all directions; white is a matte white surface in the same light."""
-    texels = np.linspace(0, compressed.levels[0, 1] * compressed.levels[0, 2] - 1, _SOME_TEXELS).astype(int)
-    decoded = np.stack([compressed.texel_brdf(texel) for texel in texels], axis=2)
-    exact = np.stack([values.get_view(view)[:, texels] for view in range(len(decoded))])
-    return float(np.linalg.norm(_to_lab(decoded) - _to_lab(exact), axis=-1).mean())
+    target_bits = 8 * 3 * values.grid.num_directions**2 / _AT_RATIO  # bits of all views per texel
+    return float(np.sqrt(np.interp(target_bits, bits[::-1], residual[::-1]) / energy))
 
 
 def _to_lab(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -136,17 +165,3 @@ def _to_lab(values: NDArray[Any]) -> NDArray[np.float64]:
         np.where(relative_xyz > 216 / 24389, np.cbrt(relative_xyz), relative_xyz * 841 / 108 + 4 / 29), -1, 0
     )
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
-
-
-def _describe(curves: dict[str, _Curve]) -> dict[str, Any]:
-    return {
-        name: {
-            "curve": [
-                f"1:{ratio:g} {error:.1%} ({least:.1%})"
-                for ratio, error, least in zip(_RATIOS, curve.errors, curve.least, strict=True)
-            ],
-            "of_range": curve.error * curve.range_error,
-            "delta_e": curve.delta_e,
-        }
-        for name, curve in curves.items()
-    }

@@ -107,7 +107,11 @@ def _records(folder: Path, side: int) -> list[BtfRecord]:
     for number in range(_NUM):
         source = folder / f"{number}.txt"
         source.write_text(str(number))
-        dimmed = replace(full_record, mean=(full_record.mean * (1 - 0.1 * number)).astype(np.float16))
+        factor = np.float32(1 - 0.1 * number)
+        dimmed = replace(
+            full_record, mean=(full_record.mean * factor).astype(np.float16), mean_step=full_record.mean_step * factor,
+            average=full_record.average * factor,
+        )  # fmt: skip
         records.append(store_btf(folder / "btfs", source, f"BTF {number}", "weave", lambda made=dimmed: made))  # type: ignore[misc]
     return records
 
@@ -126,7 +130,7 @@ def _repeat_texture(whole: LocalPcaBtf, times: int) -> LocalPcaBtf:
     )
     return replace(
         whole, levels=np.array(mip_levels, np.int32), cluster=np.ascontiguousarray(cluster),
-        weight=np.ascontiguousarray(weight), height=np.zeros((1, 1), np.float32),
+        weight=np.ascontiguousarray(weight), height=np.zeros((1, 1), np.float32), shared=None,
     )  # fmt: skip
 
 

@@ -173,7 +173,10 @@ GROUPS = (
     Group("relume_bench.probes_static_view", ("probes.static_view_s", "probes.correction_s")),
     Group("relume_bench.free_camera_correction", ("free_camera.correction_ratio",)),
     Group("relume_bench.canvas_free_camera", ("probes.canvas_fps",)),
-    Group("relume_bench.btf", ("btf.compression_error", "btf.compression_ratio", "btf.compression_s")),
+    Group(
+        "relume_bench.btf",
+        ("btf.compression_error", "btf.compression_flat_error", "btf.compression_ratio", "btf.compression_s"),
+    ),
     Group("relume_bench.btf_accuracy", ("btf.geometry_rmse", "btf.sphere_rmse", "btf.table_rmse")),
     Group("relume_bench.btf_moving", ("btf.moving_rmse",)),
     Group("relume_bench.btf_speed", ("btf.view_fps", "btf.light_ms", "btf.light_bytes")),

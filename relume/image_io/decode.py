@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import PIL.Image
@@ -12,6 +14,8 @@ from numpy.typing import NDArray
 from relume.core.errors import SceneError
 
 U8 = NDArray[np.uint8]
+F32 = NDArray[np.float32]
+Scalar = TypeVar("Scalar", bound=np.generic)
 MAX_SIDE = 8_192
 MAX_TEXELS = 1_000_000_000  # of all images of a scene together, counted per decoding
 MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
@@ -30,12 +34,21 @@ class Decoder:
         Raises:
             SceneError: the image is too large, damaged, or of another format than PNG, JPEG and WebP.
         """
+        return self._decode(data, label, _rgba)
+
+    def decode_gray(self, data: bytes, label: str) -> Shaped[F32, "height width"]:
+        """Decode an image to its luma in [0, 1], with all 16 bits of a gray image. Raises SceneError as `decode`."""
+        return self._decode(data, label, _gray)
+
+    def _decode(
+        self, data: bytes, label: str, convert: Callable[[PIL.Image.Image], NDArray[Scalar]]
+    ) -> NDArray[Scalar]:
         if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
             raise SceneError(f"{label} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
         try:
             with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
                 self._check_size(*image.size, label)
-                return _rgba(image)
+                return convert(image)
         except SceneError:
             raise
         except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
@@ -57,3 +70,9 @@ def _rgba(image: PIL.Image.Image) -> U8:
         gray = np.clip(np.asarray(image, np.int64) // 257, 0, 255).astype(np.uint8)
         return np.stack([gray, gray, gray, np.full_like(gray, 255)], axis=-1)
     return np.asarray(image.convert("RGBA"), np.uint8)
+
+
+def _gray(image: PIL.Image.Image) -> F32:
+    if image.mode.startswith("I"):
+        return np.asarray(np.clip(np.asarray(image, np.float32) / 65535, 0, 1), np.float32)
+    return np.asarray(np.asarray(image.convert("L"), np.float32) / 255, np.float32)

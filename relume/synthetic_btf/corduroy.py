@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relume.synthetic_btf.tileable_geometry import Tile
+from relume.synthetic_btf.tileable_geometry import Tile, height_field
 
 _CORDS = 4  # per period
 _HEIGHT, _PILE = 0.09, 0.012
@@ -25,16 +25,4 @@ def corduroy() -> Tile:
         pile += np.cos(2 * np.pi * (across * u + along * v) + rng.uniform(0, 2 * np.pi)) / 40**0.5
     round_top = np.abs(np.sin(np.pi * _CORDS * u)) ** 0.7
     height = _HEIGHT * round_top + _PILE * pile * (0.3 + 0.7 * round_top)
-    positions = np.stack([u, v, height], axis=-1)
-    step = 1 / _STEPS
-    inner = height[:-1, :-1]  # one period, for periodic differences
-    slope = [
-        np.pad((np.roll(inner, -1, k) - np.roll(inner, 1, k)) / (2 * step), ((0, 1), (0, 1)), "wrap") for k in (1, 0)
-    ]
-    normals = np.stack([-slope[0], -slope[1], np.ones_like(height)], axis=-1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    i, j = np.meshgrid(np.arange(_STEPS), np.arange(_STEPS), indexing="ij")
-    a = (i * (_STEPS + 1) + j).ravel()
-    b, c, d = a + 1, a + _STEPS + 1, a + _STEPS + 2
-    faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
-    return Tile.with_single_material(positions.reshape(-1, 3), normals.reshape(-1, 3), faces, TERMS)
+    return Tile.with_single_material(*height_field(height), TERMS)

@@ -14,7 +14,7 @@ from relume.brdf.symmetry import is_isotropic
 from relume.core.errors import ParameterError, SceneError
 from relume.scene.model import Material, Scene
 from relume.scene_io.import_scene import import_scene
-from relume.synthetic_btf.tileable_geometry import F64, Terms, Tile
+from relume.synthetic_btf.tileable_geometry import COLOR_CHANNELS, F64, Terms, Tile
 
 MAX_FACES = 60_000
 """Form factors between faces take two kilobytes per face, several times."""
@@ -44,12 +44,15 @@ def read_tile(file: Path, period: float | None) -> Tile:
         [mesh.faces.astype(np.int64) + start for mesh, start in zip(scene.meshes, starts, strict=False)]
     )
     material = np.repeat([mesh.material for mesh in scene.meshes], counts)
+    materials = _materials_in_use(scene)
     return Tile(
         _to_unit_square(positions, period),
         normals,
         faces,
         material,
-        tuple(map(_isotropic_terms, _materials_in_use(scene))),
+        tuple(map(_isotropic_terms, materials)),
+        np.concatenate([mesh.uvs for mesh in scene.meshes]).astype(np.float64),
+        tuple(material.textures for material in materials),
     )
 
 
@@ -80,11 +83,15 @@ def _materials_in_use(scene: Scene) -> list[Material]:
 
 
 def _isotropic_terms(material: Material) -> Terms:
-    """Terms of an isotropic material without textures. Raises SceneError."""
-    if material.textures or material.normal_map is not None or material.is_alpha_tested:
+    """Terms of an isotropic material. Raises SceneError."""
+    if not set(material.textures) <= set(COLOR_CHANNELS) or material.normal_map is not None or material.is_alpha_tested:
         raise SceneError(
-            f"material {material.name[:80]!r} has textures or is transparent, which BTFs don't support; use colors"
+            f"material {material.name[:80]!r} is transparent, or has images of roughness, normals or emission, which "
+            "BTFs don't support; use colors, images of color, and real relief"
         )
     if not all(is_isotropic({"params": {}, "curves": {}, **term}) for term in material.terms):
         raise SceneError(f"material {material.name[:80]!r} is anisotropic, which BTFs don't support; change it")
-    return tuple({**term, "texture": None} for term in material.terms)
+    return tuple(
+        {**term, "texture": term.get("texture") if term.get("texture") in material.textures else None}
+        for term in material.terms
+    )

@@ -15,8 +15,9 @@ with form factors from random rays, over several bounces.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -29,8 +30,9 @@ from relume.brdf.evaluate import eval_brdf
 from relume.raytrace.camera_rays import Hits, trace_rays
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.tangents import any_tangent
+from relume.raytrace.texture import MipMap
 from relume.raytrace.visibility import trace_visibility
-from relume.synthetic_btf.tileable_geometry import I64, Tile, centered_height, repeat_tile
+from relume.synthetic_btf.tileable_geometry import COLOR_CHANNELS, I64, Tile, centered_height, repeat_tile
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -46,14 +48,20 @@ _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class _SurfaceSamples(NamedTuple):
-    """Points offset from the geometry, with shading normals. position, normal: (n, 3) float32. material: (n,)"""
+    """Points offset from the geometry, with shading normals.
+
+    Attributes:
+        position, normal: (n, 3) float32. material: (n,).
+        color: one, and the colors of the textures of `COLOR_CHANNELS`. (n, 3, rgb)
+    """
 
     position: F32
     normal: F32
     material: I64
+    color: F64
 
     def rows(self, rows: slice) -> _SurfaceSamples:
-        return _SurfaceSamples(self.position[rows], self.normal[rows], self.material[rows])
+        return _SurfaceSamples(*(array[rows] for array in self))
 
 
 class _LightSamples(NamedTuple):
@@ -83,6 +91,7 @@ class TileGeometry:
         self._materials = [
             [{"params": {}, "curves": {}, "texture": None, **term} for term in terms] for terms in tile.materials
         ]
+        self._textures = tile.textures
         self._num_faces, self._material = len(tile.faces), tile.material
         centered = centered_height(tile)
         # periods that rays cross, and geometry that extends over the square's sides
@@ -141,16 +150,15 @@ class TileGeometry:
         """Contribution of hits to the values toward wo, by light. (lights, hits, 3)"""
         is_hit, values = hits.face >= 0, np.zeros((self.grid.num_directions, len(hits.face), 3))
         surface_hits = hits.rows(is_hit)
-        samples = self._surface_samples(surface_hits, wo)
+        samples = self._surface_samples(surface_hits, wo, 1 / (max(self.size) * self._samples_per_side))
         step = max(1, _MAX_PAIRS // self.grid.num_directions)
         rows = np.flatnonzero(is_hit)
         for start in range(0, len(rows), step):
             direct = self._direct(samples.rows(slice(start, start + step)), wo, light_samples.directions)
             values[:, rows[start : start + step]] = np.tensordot(light_samples.weights, direct, (1, 1))
         face, sample_weight = surface_hits.face % self._num_faces, 1 / (np.pi * len(self._light_samples))
-        values[:, rows] += (sample_weight * self._reflectance[face, None] * self._indirect_irradiance[face]).transpose(
-            1, 0, 2
-        )
+        reflected = sample_weight * self._reflectance(samples)[:, None] * self._indirect_irradiance[face]
+        values[:, rows] += reflected.transpose(1, 0, 2)
         return values
 
     def _direct(self, samples: _SurfaceSamples, wo: F64, lights: F64) -> F64:
@@ -165,8 +173,10 @@ class TileGeometry:
         out = np.zeros((*cosine.shape, 3))
         for material_index, terms in enumerate(self._materials):
             has_material = samples.material[sample_index] == material_index
+            color = samples.color[sample_index[has_material]]
             out[sample_index[has_material], light_index[has_material]] = sum(
-                eval_brdf(term, local[has_material], wo_local[has_material]) for term in terms
+                color[:, _channel(term)] * eval_brdf(term, local[has_material], wo_local[has_material])
+                for term in terms
             )
         return np.asarray(out * cosine[..., None])
 
@@ -176,7 +186,8 @@ class TileGeometry:
         ).visible
         return np.unpackbits(visibility_bits, axis=1, count=len(lights), bitorder="little").astype(np.float64)
 
-    def _surface_samples(self, hits: Hits, wo: F64) -> _SurfaceSamples:
+    def _surface_samples(self, hits: Hits, wo: F64, side: float | F64) -> _SurfaceSamples:
+        """Surface at hits, seen toward wo. side: width of the surface over which textures are averaged, periods."""
         corners = self._repeated_tile.faces[hits.face]
         p, n = self._positions[corners].astype(np.float64), self._repeated_tile.normals[corners]
         b = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])[..., None]
@@ -190,15 +201,43 @@ class TileGeometry:
         normal += deficit * wo
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         position = (p * b).sum(axis=1) + _SURFACE_OFFSET * face_normal
-        return _SurfaceSamples(
-            position.astype(np.float32), normal.astype(np.float32), self._repeated_tile.material[hits.face]
-        )
+        material = self._repeated_tile.material[hits.face]
+        uv = (self._repeated_tile.uvs[corners] * b).sum(axis=1)
+        color = self._texture_colors(material, uv, side * self._uv_scale[hits.face % self._num_faces])
+        return _SurfaceSamples(position.astype(np.float32), normal.astype(np.float32), material, color)
+
+    def _texture_colors(self, material: I64, uv: F64, footprint: F64) -> F64:
+        """Colors that multiply terms, see `_SurfaceSamples`. uv: (n, 2). footprint: side in UV space, (n,)."""
+        out = np.ones((len(uv), 1 + len(COLOR_CHANNELS), 3))
+        for index, textures in enumerate(self._textures):
+            rows = np.flatnonzero(material == index)
+            for channel in set(textures) & set(COLOR_CHANNELS) if len(rows) else ():
+                mip_map = MipMap.for_texture(textures[channel])
+                out[rows, 1 + COLOR_CHANNELS.index(channel)] = mip_map.sample(
+                    uv[rows].astype(np.float32), footprint[rows].astype(np.float32)
+                )
+        return out
 
     @cached_property
-    def _reflectance(self) -> F64:
-        """ρ of each face of the tile. (faces, 3)"""
-        reflectances = [sum((reflectance(term) for term in terms), np.zeros(3)) for terms in self._materials]
-        return np.asarray(reflectances, np.float64)[self._material]
+    def _face_side(self) -> F64:
+        """Square root of twice the area of each face of the tile, in periods. (faces,)"""
+        p = self._repeated_tile.positions[self._repeated_tile.faces[: self._num_faces]]
+        return np.asarray(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) ** 0.5)
+
+    @cached_property
+    def _uv_scale(self) -> F64:
+        """Length in UV space of a period on each face of the tile. (faces,)"""
+        uv = self._repeated_tile.uvs[self._repeated_tile.faces[: self._num_faces]]
+        (au, av), (bu, bv) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
+        return np.asarray(np.abs(au * bv - av * bu) ** 0.5 / np.maximum(self._face_side, 1e-12))
+
+    def _reflectance(self, samples: _SurfaceSamples) -> F64:
+        """ρ of samples. (n, 3)"""
+        by_channel = np.zeros((len(self._materials), 1 + len(COLOR_CHANNELS), 3))
+        for index, terms in enumerate(self._materials):
+            for term in terms:
+                by_channel[index, _channel(term)] += reflectance(term)
+        return np.asarray((samples.color * by_channel[samples.material]).sum(axis=1))
 
     @cached_property
     def _indirect_irradiance(self) -> F64:
@@ -209,14 +248,14 @@ class TileGeometry:
             np.full((self._num_faces, 2), 1 / 3, np.float32),
             np.ones(self._num_faces, np.float32),
         )
-        samples = self._surface_samples(face_centers, np.array([0.0, 0.0, 1.0]))
+        samples = self._surface_samples(face_centers, np.array([0.0, 0.0, 1.0]), self._face_side)
         cosine = np.maximum(np.einsum("nc,lc->nl", samples.normal.astype(np.float64), self._directions), 0)
         direct = (cosine * self._visible(samples, self._directions))[..., None] * np.ones(3)
         form_factors = self._form_factors(samples)
         num, lights = direct.shape[:2]
-        incident, indirect = direct, np.zeros_like(direct)
+        incident, indirect, reflectances = direct, np.zeros_like(direct), self._reflectance(samples)[:, None]
         for _ in range(_BOUNCES):
-            incident = (form_factors @ (self._reflectance[:, None] * incident).reshape(num, -1)).reshape(num, lights, 3)
+            incident = (form_factors @ (reflectances * incident).reshape(num, -1)).reshape(num, lights, 3)
             indirect += incident
         return np.asarray(indirect)
 
@@ -235,6 +274,11 @@ class TileGeometry:
         row = np.repeat(np.arange(num), _RAYS_PER_FACE)[hit]
         weight = np.full(len(row), 1 / _RAYS_PER_FACE)
         return csr_array((weight, (row, hits.face[hit] % num)), (num, num))
+
+
+def _channel(term: Mapping[str, Any]) -> int:
+    """Index of the color that multiplies a term, see `_SurfaceSamples`."""
+    return (None, *COLOR_CHANNELS).index(term["texture"])
 
 
 def _uniform_hemisphere(num: int) -> F64:

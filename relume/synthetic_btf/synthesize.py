@@ -9,7 +9,6 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -21,6 +20,7 @@ from relume.assets.btf.partial_results import PartialCompression
 from relume.assets.btf.value_cache import ValueFile
 from relume.core.errors import ParameterError
 from relume.synthetic_btf.corduroy import corduroy
+from relume.synthetic_btf.from_images import ImageTile
 from relume.synthetic_btf.from_mesh import read_tile
 from relume.synthetic_btf.pebbles import pebbles
 from relume.synthetic_btf.render import TileGeometry
@@ -30,6 +30,8 @@ from relume.synthetic_btf.weave import weave
 GEOMETRIES = {"weave": weave, "pebbles": pebbles, "corduroy": corduroy}
 MESH: Final = "mesh"
 """Geometry from a file."""
+IMAGES: Final = "images"
+"""Images of heights and colors."""
 MIN_SIZE = 8
 MAX_GRID = 8
 _SEED = 1
@@ -41,10 +43,10 @@ class SyntheticBtf(NamedTuple):
     """A request for a synthetic BTF.
 
     Attributes:
-        geometry: one of `GEOMETRIES`, or `MESH`. size: texels per side.
+        geometry: one of `GEOMETRIES`, `MESH` or `IMAGES`. size: texels per side.
         grid: samples along each side of a texel, each with different light directions.
         bound: allowed relative RMS error of the compression.
-        file: file of a mesh. period: period of the mesh, see `read_tile`.
+        file: file of a mesh. period: period of the mesh, see `read_tile`. images: images of heights and colors.
     """
 
     geometry: str
@@ -53,10 +55,13 @@ class SyntheticBtf(NamedTuple):
     bound: float
     file: Path | None = None
     period: float | None = None
+    images: ImageTile | None = None
 
     def check(self) -> None:
         """Raise ParameterError if a value is out of range."""
-        if self.geometry not in GEOMETRIES and self.file is None:
+        if self.images is not None:
+            self.images.check()
+        elif self.geometry not in GEOMETRIES and self.file is None:
             raise ParameterError("geometry", self.geometry, f"one of {', '.join(GEOMETRIES)}")
         if not (self.size >= MIN_SIZE and self.size**2 <= MAX_TEXELS):
             raise ParameterError("--size", self.size, f"{MIN_SIZE} to {int(MAX_TEXELS**0.5)} texels")
@@ -67,17 +72,26 @@ class SyntheticBtf(NamedTuple):
 
     def tile(self) -> Tile:
         """Return the geometry. Raises SceneError, ParameterError if the file is unusable."""
+        if self.images is not None:
+            return self.images.read()
         return GEOMETRIES[self.geometry]() if self.file is None else read_tile(self.file, self.period)
 
     def recipe(self, tile: Tile) -> dict[str, Any]:
         """Describe all inputs; equal recipes are the same BTF."""
         fields = {name: getattr(self, name) for name in ("geometry", "size", "grid", "bound")}
-        if self.file is not None:
-            hashed = hashlib.sha256(json.dumps(tile.materials, sort_keys=True).encode())
-            for array in tile[:-1]:
-                hashed.update(array.tobytes())
-            fields["tile"] = hashed.hexdigest()
+        if self.geometry not in GEOMETRIES:
+            fields["tile"] = _hash_tile(tile)
         return {"synthetic": fields, "seed": _SEED, "light": _LIGHT}
+
+
+def _hash_tile(tile: Tile) -> str:
+    textures = [sorted(textures.items()) for textures in tile.textures]
+    images = [(channel, texture.wrap, texture.encoding) for items in textures for channel, texture in items]
+    hashed = hashlib.sha256(json.dumps([tile.materials, repr(images)], sort_keys=True).encode())
+    pixels = [texture.pixels for items in textures for _, texture in items]
+    for array in (tile.positions, tile.normals, tile.faces, tile.material, tile.uvs, *pixels):
+        hashed.update(array.tobytes())
+    return hashed.hexdigest()
 
 
 def synthesize_btf(
@@ -116,14 +130,14 @@ def synthesize_btf(
         values.fill(geometry.get_view, lambda share: progress(_RENDER_PROGRESS * share), is_canceled)
         compress_progress = 1 - _RENDER_PROGRESS
         partial_compression = PartialCompression(partial_folder / "compressed", {"bound": request.bound})
-        btf = compress(
+        return compress(
             values,
             request.bound,
             lambda share: progress(_RENDER_PROGRESS + compress_progress * share),
             is_canceled,
             partial_compression,
+            geometry.height(),
         )
-        return replace(btf, height=geometry.height())
 
     record = store_btf(folder, recipe, name, request.geometry, render_and_compress)
     shutil.rmtree(partial_folder)

@@ -9,9 +9,14 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.scene.model import Texture
+
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 Terms = tuple[Mapping[str, Any], ...]
+
+COLOR_CHANNELS = ("diffuse", "specular")
+"""Textures that multiply the terms that name them."""
 
 
 class Tile(NamedTuple):
@@ -23,6 +28,7 @@ class Tile(NamedTuple):
         normals: unit. faces: counterclockwise from outside.
         material: material index of each face.
         materials: terms of each, as in look documents; isotropic.
+        uvs: UV coordinates, v from the top. textures: images of each material by channel, as in `Material.textures`.
     """
 
     positions: Shaped[F64, "vertices 3"]
@@ -30,6 +36,8 @@ class Tile(NamedTuple):
     faces: Shaped[I64, "triangles 3"]
     material: Shaped[I64, " triangles"]
     materials: tuple[Terms, ...]
+    uvs: Shaped[F64, "vertices 2"]
+    textures: tuple[Mapping[str, Texture], ...]
 
     @classmethod
     def with_single_material(
@@ -40,7 +48,8 @@ class Tile(NamedTuple):
         terms: Terms,
     ) -> Self:
         """Make a tile from `positions` and `normals` of vertices, with one material of `terms` for all faces."""
-        return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,))
+        uvs = positions[:, :2] * [1, -1] + [0, 1]
+        return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,), uvs, ({},))
 
 
 def centered_height(tile: Tile) -> Tile:
@@ -59,7 +68,33 @@ def repeat_tile(tile: Tile, num_repeats: int) -> Tile:
         normals=np.tile(tile.normals, (len(offsets), 1)),
         faces=np.concatenate([tile.faces + k * count for k in range(len(offsets))]),
         material=np.tile(tile.material, len(offsets)),
+        uvs=np.tile(tile.uvs, (len(offsets), 1)),
     )
+
+
+def height_field(
+    height: Shaped[F64, "steps_plus_1 steps_plus_1"],
+) -> tuple[Shaped[F64, "vertices 3"], Shaped[F64, "vertices 3"], Shaped[I64, "triangles 3"]]:
+    """Triangulate a periodic height field over the unit square: positions, normals and faces.
+
+    Args:
+        height: heights by y and x, both rising, with the first row and column repeated at the end.
+    """
+    steps = len(height) - 1
+    u, v = np.meshgrid(np.linspace(0, 1, steps + 1), np.linspace(0, 1, steps + 1), indexing="xy")
+    positions = np.stack([u, v, height], axis=-1)
+    step = 1 / steps
+    inner = height[:-1, :-1]  # one period, for periodic differences
+    slope = [
+        np.pad((np.roll(inner, -1, k) - np.roll(inner, 1, k)) / (2 * step), ((0, 1), (0, 1)), "wrap") for k in (1, 0)
+    ]
+    normals = np.stack([-slope[0], -slope[1], np.ones_like(height)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    i, j = np.meshgrid(np.arange(steps), np.arange(steps), indexing="ij")
+    a = (i * (steps + 1) + j).ravel()
+    b, c, d = a + 1, a + steps + 1, a + steps + 2
+    faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    return positions.reshape(-1, 3), normals.reshape(-1, 3), faces
 
 
 def extruded(

@@ -6,12 +6,13 @@ import itertools
 
 import numpy as np
 import pytest
+from bit_packer import pack
 from for_all import for_all
 from hemisphere_quadrature import hemisphere
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from relume.assets.btf.bit_packing import max_code, pack, packed_bytes, unpack
+from relume.assets.btf.bit_packing import max_code, packed_bytes, unpack
 from relume.math import daubechies
 from relume.math.haar import haar, padded_length
 from relume.math.pca import decompose

@@ -12,7 +12,7 @@ from btf_zips import zipped
 from fastapi.testclient import TestClient
 from server_fakes import Control
 
-from relume.assets.btf.compress import ViewArrays
+from relume.assets.btf.compressed_view import ViewArrays
 from relume.assets.btf.import_btf import import_btf
 from relume.core.errors import CancelledError
 from relume_server.settings import Settings

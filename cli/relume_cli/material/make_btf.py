@@ -13,12 +13,16 @@ from relume_cli.terminal.printing import Json
 
 def material_make_btf(
     geometry: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            metavar="weave|pebbles|corduroy|FILE",
+            metavar="[weave|pebbles|corduroy|FILE]",
             help="Geometry to render; a .glb, .obj or .ply file contains one period, +Y up.",
         ),
-    ],
+    ] = None,
+    height: Annotated[Path | None, typer.Option(help="Instead of a geometry: image of heights, black lowest.")] = None,
+    color: Annotated[Path | None, typer.Option(help="Instead of a geometry: image of colors, on the heights.")] = None,
+    relief: Annotated[float, typer.Option(help="Images: height of white over black, in sides of the image.")] = 0.02,
+    roughness: Annotated[float, typer.Option(help="Images: roughness of the gloss, 0.05 to 1.")] = 0.6,
     size: Annotated[int, typer.Option(help="Texels along each side.")] = 128,
     grid: Annotated[int, typer.Option(help="Samples along each side of a texel.")] = 3,
     error: Annotated[float, typer.Option(help="Relative RMS error allowed in compression.")] = 0.05,
@@ -30,25 +34,33 @@ def material_make_btf(
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render a small geometry as a BTF.
+    """Render a small geometry, or images of heights and colors, as a BTF.
 
     From 81 view directions under 81 light directions; nothing is measured. If it is interrupted, run it again: it
     resumes.
     """
     from relume.assets.asset_store import check_name
-    from relume.synthetic_btf.synthesize import GEOMETRIES, MESH, SyntheticBtf, synthesize_btf
+    from relume.core.errors import ParameterError
+    from relume.synthetic_btf.from_images import ImageTile
+    from relume.synthetic_btf.synthesize import GEOMETRIES, IMAGES, MESH, SyntheticBtf, synthesize_btf
     from relume_cli.data_folder import open_settings
     from relume_cli.interrupts import until_interrupted
     from relume_cli.material.messages import print_btf
     from relume_worker.paths import btfs_path
 
-    file = None if geometry in GEOMETRIES or not Path(geometry).suffix else Path(geometry)
-    request = SyntheticBtf(geometry if file is None else MESH, size, grid, error, file, period)
+    images = None if height is None and color is None else ImageTile(height, color, relief, roughness)
+    if (geometry is None) == (images is None):
+        raise ParameterError("geometry", geometry, "either a geometry, or images by --height and --color")
+    file = None if geometry is None or geometry in GEOMETRIES or not Path(geometry).suffix else Path(geometry)
+    kind = IMAGES if geometry is None else geometry if file is None else MESH
+    request = SyntheticBtf(kind, size, grid, error, file, period, images)
     request.check()
-    asset_name = check_name(name or f"{geometry.capitalize() if file is None else file.stem} (synthetic)")
+    source = file or color or height
+    stem = kind.capitalize() if source is None else source.stem
+    asset_name = check_name(name or f"{stem} (synthetic)")
     folder = btfs_path(open_settings(data).data)
     record = until_interrupted(
-        f"{geometry}, {size}×{size} texels",
+        f"{stem}, {size}×{size} texels",
         lambda progress, stopped: synthesize_btf(folder, request, asset_name, progress, stopped),
     )
     print_btf(record, as_json=as_json)

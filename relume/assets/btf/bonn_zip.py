@@ -39,7 +39,7 @@ Direction = tuple[int, int]
 
 
 class ZippedBtf:
-    """The images of a zip; implements `relume.assets.btf.compress.ViewArrays` without a cache.
+    """The images of a zip; implements `relume.assets.btf.compressed_view.ViewArrays` without a cache.
 
     Args:
         path: path of the file.

@@ -1,37 +1,44 @@
 """Store of imported and synthetic BTFs, in `relume.assets.asset_store`.
 
-    <folder>/<id>/mean.npy, eigen.npy, …        arrays of `relume.assets.btf.local_pca_btf.LocalPcaBtf`
-                  packed.npy                    clusters and weights, bit-packed (`relume.assets.btf.bit_packing`)
-                  btf.json                      name, origin, directions, error of the compression
+    <folder>/<id>/arrays.npz    arrays of `relume.assets.btf.stored_arrays`, deflated
+                  btf.json      name, origin, directions, error of the compression
+
+Older folders have a .npy file for each array, with clusters and weights bit-packed (`relume.assets.btf.bit_packing`).
 
 Looks refer to one as "btf:<id>".
 """
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.assets.asset_store import AssetStore
-from relume.assets.btf.bit_packing import cluster_bits, max_code, pack, packed_bytes, unpack
-from relume.assets.btf.compress import MAX_CLUSTERS, MAX_COMPONENTS, MAX_TEXELS
-from relume.assets.btf.direction_rings import make_direction_grid
+from relume.assets.btf.bit_packing import cluster_bits, max_code, packed_bytes, unpack
+from relume.assets.btf.compress import MAX_TEXELS
+from relume.assets.btf.direction_rings import DirectionGrid, make_direction_grid
 from relume.assets.btf.local_pca_btf import I8, MAX_HEIGHT, U8, LocalPcaBtf
+from relume.assets.btf.per_view_coder import MAX_CLUSTERS, MAX_COMPONENTS
+from relume.assets.btf.stored_arrays import from_arrays, stored_bytes, to_arrays
+from relume.assets.btf.whole_brdf_coder import MAX_SHARED_CLUSTERS
 from relume.core.cache import asset_cached
 from relume.core.errors import MaterialError
 
 STORE = AssetStore("BTF", "btf:", "btf.json", MaterialError, max_entries=100)
-_PACKED_FILE = "packed.npy"
-_ARRAYS = {
-    "levels": np.int32, "mean": np.float16, "eigen": np.int8,
-    "step": np.float32, "average": np.float32,
-    "height": np.float32,
+_ARRAYS_FILE = "arrays.npz"
+_TYPES = {
+    "levels": np.int32, "mean": np.int8, "mean_step": np.float32, "eigen": np.int8, "step": np.float32,
+    "average": np.float32, "height": np.float32, "cluster": np.uint8, "weight": np.int8,
+    "shared_cluster": np.uint8, "shared_weight": np.int8,
 }  # fmt: skip
+_MAX_STORED_BYTES = 4 << 30  # of all arrays, not deflated
 
 
 @dataclass(frozen=True)
@@ -83,11 +90,7 @@ def store_btf(
 
     def fill(staged_folder: Path) -> dict[str, Any]:
         btf = compute()
-        for array in _ARRAYS:
-            np.save(staged_folder / f"{array}.npy", getattr(btf, array))
-        cluster_width = np.array([cluster_bits(btf.mean.shape[1])], np.uint8)
-        rows = np.concatenate([(btf.cluster - max_code(cluster_width)).astype(np.int8)[..., None], btf.weight], axis=2)
-        np.save(staged_folder / _PACKED_FILE, np.stack([pack(row, np.append(cluster_width, btf.bits)) for row in rows]))
+        np.savez_compressed(staged_folder / _ARRAYS_FILE, **to_arrays(btf))
         return {
             "synthetic": synthetic,
             "rings": [
@@ -95,10 +98,8 @@ def store_btf(
                 for theta, count in zip(btf.grid.theta, np.diff(btf.grid.first), strict=True)
             ],
             "shift": btf.grid.shift.tolist(),
-            "bits": btf.bits.tolist(),
-            "cluster_bits": int(cluster_width[0]),
             "error": list(btf.error),
-            "ratio": btf.measured_bytes / btf.num_bytes,
+            "ratio": btf.measured_bytes / stored_bytes(btf),
         }
 
     return get_record(folder, STORE.store(folder, source, name, fill))
@@ -138,44 +139,75 @@ def _load(path: Path) -> LocalPcaBtf:
         shift = [float(value) for value in document.get("shift", [])]  # older files have none: all rings start at φ = 0
         grid = make_direction_grid([(float(theta), int(count)) for theta, count in document["rings"]], shift)
         error = tuple(float(value) for value in document["error"])
-        arrays = {name: _array(path, name) for name in _ARRAYS if name != "height" or (path / "height.npy").exists()}
-        arrays.setdefault("height", np.zeros((1, 1), np.float32))  # older files have none
-        bits, cluster, weight = _texels(path, document, arrays["levels"])
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
+        btf = (
+            _load_arrays(path / _ARRAYS_FILE, grid, error)
+            if (path / _ARRAYS_FILE).exists()
+            else _load_packed(path, document, grid, error)
+        )
+    except (OSError, ValueError, KeyError, TypeError, IndexError, EOFError, BadZipFile, zlib.error) as problem:
         raise STORE.damaged_error(path) from problem
-    if not all(arrays[name].dtype == dtype for name, dtype in _ARRAYS.items()):
-        raise STORE.damaged_error(path)
-    btf = LocalPcaBtf(grid=grid, error=error, bits=bits, cluster=cluster, weight=weight, **arrays)
     if not _is_consistent(btf):
         raise STORE.damaged_error(path)
     return btf
 
 
-def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) -> tuple[U8, U8, I8]:
-    """Bits, clusters and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError if inconsistent."""
+def _load_arrays(file: Path, grid: DirectionGrid, error: tuple[float, ...]) -> LocalPcaBtf:
+    """Read the arrays. Raises ValueError, KeyError, IndexError, OSError, EOFError, BadZipFile, zlib.error."""
+    with ZipFile(file) as archive:
+        if sum(member.file_size for member in archive.infolist()) > _MAX_STORED_BYTES:
+            raise ValueError("size")
+    with np.load(file, allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files if name in _TYPES}
+    levels = arrays["levels"]
+    if not all(array.dtype == _TYPES[name] for name, array in arrays.items()) or levels.ndim != 2 or not len(levels):
+        raise ValueError("types")
+    num, size = grid.num_directions, tuple(levels[0, 1:].tolist())
+    if not 0 < size[0] * size[1] <= MAX_TEXELS or arrays["height"].shape not in ((1, 1), size):
+        raise ValueError("texels")
+    if "shared_cluster" in arrays and arrays["shared_cluster"].shape != (size[0] * size[1],):
+        raise ValueError("shared texels")
+    if arrays["mean"].shape[:1] != (num,) or arrays["mean_step"].shape != arrays["mean"].shape[:2]:
+        raise ValueError("means")
+    if not np.isfinite(arrays["height"]).all():
+        raise ValueError("height")
+    return from_arrays(arrays, grid, error)
+
+
+def _load_packed(path: Path, document: Mapping[str, Any], grid: DirectionGrid, error: tuple[float, ...]) -> LocalPcaBtf:
+    """Read an older folder. Raises OSError, ValueError, KeyError, TypeError, EOFError."""
+    arrays = {name: _array(path, name) for name in ("levels", "mean", "eigen", "step", "average")}
+    height = _array(path, "height") if (path / "height.npy").exists() else np.zeros((1, 1), np.float32)
+    cluster, weight = _texels(path, document, arrays["levels"])
+    types = {**_TYPES, "mean": np.float16}
+    if height.dtype != np.float32 or any(array.dtype != types[name] for name, array in arrays.items()):
+        raise ValueError("types")
+    mean_step = np.zeros(arrays["mean"].shape[:2], np.float32)
+    return LocalPcaBtf(
+        grid=grid, error=error, cluster=cluster, weight=weight, height=height, mean_step=mean_step, **arrays
+    )
+
+
+def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) -> tuple[U8, I8]:
+    """Clusters and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError if inconsistent."""
     if "bits" not in document:  # older files: one byte each, not packed
         weight = _array(path, "weight")
         if weight.dtype != np.int8 or weight.ndim != 3:
             raise ValueError("weights")
-        return np.full(weight.shape[2], 8, np.uint8), _clusters(path), weight
+        return _clusters(path), weight
     bits = np.array([int(value) for value in document["bits"]])
     if len(bits) > MAX_COMPONENTS or not ((bits >= 2) & (bits <= 8)).all():
         raise ValueError("bits")
     component_bits = bits.astype(np.uint8)
     if "cluster_bits" not in document:  # older files: clusters not packed
         cluster = _clusters(path)
-        return component_bits, cluster, _read_packed_rows(path, component_bits, cluster.shape[1])
+        return cluster, _read_packed_rows(path, component_bits, cluster.shape[1])
     width = int(document["cluster_bits"])
     if not 1 <= width <= cluster_bits(MAX_CLUSTERS) or levels.ndim != 2 or levels.shape[1:] != (3,):
         raise ValueError("clusters")
     cluster_width = np.array([width], np.uint8)
     num = int(levels[:, 1:].astype(np.int64).prod(axis=1).sum())
     rows = _read_packed_rows(path, np.append(cluster_width, component_bits), num)
-    return (
-        component_bits,
-        (rows[..., 0] + max_code(cluster_width)).astype(np.uint8),
-        np.ascontiguousarray(rows[..., 1:]),
-    )
+    return (rows[..., 0] + max_code(cluster_width)).astype(np.uint8), np.ascontiguousarray(rows[..., 1:])
 
 
 def _clusters(path: Path) -> U8:
@@ -205,7 +237,7 @@ def _is_consistent(btf: LocalPcaBtf) -> bool:
     """True if array shapes and indices are consistent: kernels do not check them."""
     directions = btf.grid.num_directions
     components, clusters = len(btf.error) - 1, btf.mean.shape[1] if btf.mean.ndim == 4 else 0
-    if not (1 <= clusters <= MAX_CLUSTERS and 0 <= components <= MAX_COMPONENTS):
+    if not (1 <= clusters <= MAX_SHARED_CLUSTERS and 0 <= components <= MAX_COMPONENTS):
         return False
     if btf.levels.ndim != 2 or btf.levels.shape[1] != 3 or not 1 <= len(btf.levels) <= 32:
         return False
@@ -220,12 +252,12 @@ def _is_consistent(btf: LocalPcaBtf) -> bool:
         and btf.cluster.shape == (directions, texels)
         and int(btf.cluster.max()) < clusters
         and btf.weight.shape == (directions, texels, components)
-        and btf.bits.shape == (components,)
+        and btf.mean_step.shape == (directions, clusters)
         and btf.mean.shape == (directions, clusters, directions, 3)
         and btf.eigen.shape == (directions, clusters, components, directions, 3)
         and btf.step.shape == (directions, clusters, components)
         and btf.average.shape == (directions, directions, 3)
         and btf.height.shape in ((1, 1), btf.size)
-        and all(np.isfinite(array).all() for array in (btf.mean, btf.step, btf.average, btf.height))
+        and all(np.isfinite(array).all() for array in (btf.mean, btf.mean_step, btf.step, btf.average, btf.height))
         and float(np.abs(btf.height).max()) <= MAX_HEIGHT
     )

@@ -9,7 +9,8 @@ from pathlib import Path
 from relume.assets.btf.bonn_container import FIRST_BYTE
 from relume.assets.btf.bonn_zip import ZippedBtf
 from relume.assets.btf.btf_store import STORE, BtfRecord, store_btf
-from relume.assets.btf.compress import ViewArrays, compress
+from relume.assets.btf.compress import compress
+from relume.assets.btf.compressed_view import ViewArrays
 from relume.assets.btf.local_pca_btf import LocalPcaBtf
 from relume.assets.btf.matrix_btf import MatrixBtf
 from relume.assets.btf.partial_results import PartialCompression

@@ -2,32 +2,38 @@
 
     B_x(v, l) ≈ M_vk(l) + Σ_j α_vj(x) E_vkj(l),   k = k_v(x)
 
-Local PCA for each view direction, with eigenvectors over the light. Müller 2004, section 3, clusters whole BRDFs
-instead: one cluster and one weight vector per texel for all views. Relief moves across texels from one view to the
-next, and clusters per view follow it (docs/btf.md#equations). Values are radiance toward v per unit irradiance
-perpendicular to l; the cosine is included.
+Two coders make it (`relume.assets.btf.compress`). One clusters each view by itself. The other clusters whole BRDFs as
+Müller 2004, section 3: all views share the cluster and the weights of a texel of the relief, and each view has them
+where it shows that texel. Values are radiance toward v per unit irradiance perpendicular to l; the cosine is included.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.btf.bit_packing import cluster_bits, packed_bytes
 from relume.assets.btf.direction_rings import DirectionGrid
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
+U8 = NDArray[np.uint8]
 
 
 INT8_MAX = 127
 MAX_HEIGHT = 4.0
 """Largest height of a relief, in side lengths of its texture: a ray would cross many periods of a higher one."""
-U8 = NDArray[np.uint8]
+
+
+class SharedTexels(NamedTuple):
+    """Clusters and weights of the finest level that all views share, by texel of the relief; see `LocalPcaBtf`."""
+
+    cluster: Shaped[U8, " texels"]
+    weight: Shaped[I8, "texels C"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,26 +45,29 @@ class LocalPcaBtf:
         levels: first texel, height and width of each mip level.
         cluster: cluster index of each texel of each level.
         weight: weights α, in units of `step`.
-        bits: bits per weight of each component, including the sign.
         mean: cluster means M.
+        mean_step: quantization step of the difference between a mean and the average.
         eigen: eigenvectors E, in units of `step`.
         step: quantization step of the product of weight and eigenvector.
         average: mean of all texels.
         height: height of the relief above the plane, in side lengths of the texture; one zero if unknown.
         error: relative RMS error of the texels by the number of components, from zero to C.
+        shared: what all views share, from which `cluster` and `weight` of the finest level follow; None if each view
+            has its own.
     """
 
     grid: DirectionGrid
     levels: Shaped[NDArray[np.int32], "levels 3"]
-    cluster: Shaped[NDArray[np.uint8], "V texels"]
+    cluster: Shaped[U8, "V texels"]
     weight: Shaped[I8, "V texels C"]
-    bits: Shaped[U8, " C"]
     mean: Shaped[NDArray[np.float16], "V K L 3"]
+    mean_step: Shaped[F32, "V K"]
     eigen: Shaped[I8, "V K C L 3"]
     step: Shaped[F32, "V K C"]
     average: Shaped[F32, "V L 3"]
     height: Shaped[F32, "height width"]
     error: tuple[float, ...]
+    shared: SharedTexels | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -69,14 +78,6 @@ class LocalPcaBtf:
     def num_components(self) -> int:
         """Number of components, C."""
         return int(self.weight.shape[2])
-
-    @property
-    def num_bytes(self) -> int:
-        """Compressed size without mip levels, which the measured data do not have either."""
-        bits = np.append(self.bits, np.uint8(cluster_bits(self.mean.shape[1])))
-        texel_bytes = packed_bytes(self.size[0] * self.size[1], bits)
-        tables = self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
-        return self.grid.num_directions * texel_bytes + tables + self.height.nbytes
 
     @property
     def measured_bytes(self) -> int:
@@ -90,10 +91,10 @@ class LocalPcaBtf:
         return replace(
             self,
             weight=np.ascontiguousarray(self.weight[..., :num_components]),
-            bits=self.bits[:num_components],
             eigen=self.eigen[:, :, :num_components],
             step=self.step[..., :num_components],
             error=self.error[: num_components + 1],
+            shared=self.shared and SharedTexels(self.shared.cluster, self.shared.weight[:, :num_components]),
         )
 
     def tables(self) -> Shaped[F32, "V K mean_and_components 3 L"]:

@@ -24,7 +24,7 @@ _MODELS = (_RGB, _OF_YUV, _LOG_Y, _LOG_Y_RATIOS, _LOG_RGB)
 
 
 class MatrixBtf:
-    """The values of a .btf file; implements `relume.assets.btf.compress.ViewArrays`.
+    """The values of a .btf file; implements `relume.assets.btf.compressed_view.ViewArrays`.
 
     Args:
         path: path of the file.

@@ -84,3 +84,36 @@ def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore
             return previous_z + step * clearance / max(clearance - next_clearance, np.float32(1e-9))
         clearance, previous_z = next_clearance, z
     return lowest
+
+
+@nb.njit(nogil=True, cache=True)
+def _visible_texels_kernel(height, shears, size, out):  # type: ignore[no-untyped-def]
+    """Kernel of `visible_texels`. size: height and width of the texture. out: (n, texels), written"""
+    lowest, highest = height.min(), height.max()
+    rows, columns = size
+    for view in range(out.shape[0]):
+        shear = (shears[view, 0], shears[view, 1])
+        for texel in range(out.shape[1]):
+            u = np.float32((texel % columns + 0.5) / columns)
+            v = np.float32((texel // columns + 0.5) / rows)
+            z = parallax_intersection(height, lowest, highest, u, v, shear)
+            column = np.int64(math.floor((u + z * shear[0]) * columns)) % columns
+            row = np.int64(math.floor((v - z * shear[1]) * rows)) % rows
+            out[view, texel] = row * columns + column
+
+
+def visible_texels(
+    height: Shaped[F32, "height width"], grid: DirectionGrid, size: tuple[int, int]
+) -> Shaped[NDArray[np.int32], "n texels"]:
+    """Texel of the relief that each texel shows from each direction: the nearest to where its ray meets the relief.
+
+    Args:
+        height: height of the relief, in side lengths of the texture; one number for a plane.
+        grid: grid of the directions. size: height and width of the texture, texels.
+    """
+    num = size[0] * size[1]
+    if height.min() == height.max():
+        return np.tile(np.arange(num, dtype=np.int32), (grid.num_directions, 1))
+    out = np.empty((grid.num_directions, num), np.int32)
+    _visible_texels_kernel(np.ascontiguousarray(height), compute_shears(grid), size, out)
+    return out

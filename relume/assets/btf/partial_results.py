@@ -9,17 +9,22 @@ from __future__ import annotations
 import json
 import shutil
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.filesystem import atomic_write
 
-_FORMAT = 2
+_FORMAT = 3
 Arrays = Mapping[str, NDArray[Any]]
+
+
+def as_arrays(result: NamedTuple) -> Arrays:
+    """Fields of a result as arrays, by name."""
+    return {name: np.asarray(value) for name, value in result._asdict().items()}
 
 
 class PartialCompression:
@@ -51,3 +56,11 @@ class PartialCompression:
         """Save a result."""
         with atomic_write(self._folder / f"{name}.npz") as unfinished, unfinished.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
+
+    def load_or_compute(self, name: str, compute: Callable[[], Arrays]) -> Arrays:
+        """Load a result, or compute and save it."""
+        arrays = self.load(name)
+        if arrays is None:
+            arrays = compute()
+            self.save(name, arrays)
+        return arrays

@@ -25,7 +25,7 @@ MAX_VALUE = 60_000.0
 
 
 class ValueFile:
-    """Values that are filled view by view, then read; implements `relume.assets.btf.compress.ViewArrays`.
+    """Values that are filled view by view, then read; implements `relume.assets.btf.compressed_view.ViewArrays`.
 
     Args:
         folder: folder of the files; created if missing. grid: grid of the directions. size: height and width in texels.

@@ -1,4 +1,4 @@
-"""measured_btf: a bidirectional texture function, with a BRDF for each texel (Müller 2004).
+"""measured_btf: a bidirectional texture function, with a BRDF for each texel, compressed by local PCA.
 
 As a BRDF it is the mean of its texels, which is used for indirect light. At visible surfaces,
 `relume.transport.btf_kernel` evaluates the BRDF of each texel.
@@ -14,9 +14,9 @@ from typing import Any, NoReturn
 import numpy as np
 
 from relume.assets.btf.btf_store import STORE, load_btf
-from relume.assets.btf.compress import MAX_COMPONENTS
 from relume.assets.btf.local_pca_btf import F32, LocalPcaBtf
 from relume.assets.btf.mean_brdf import mean_brdf
+from relume.assets.btf.per_view_coder import MAX_COMPONENTS
 from relume.brdf.term import Parameter, Term
 from relume.core.cache import asset_cached
 from relume.core.errors import ParameterError
@@ -86,7 +86,7 @@ MEASURED_BTF = Term(
     ),
     curves=(),
     quotient=_without_data,
-    source="Müller 2004: B_v ≈ M_v + Σ α_v E_v",
+    source="local PCA, of whole BRDFs (Müller 2004) or per view: B ≈ M + Σ α E",
     texture="diffuse",
     help="A texture with its own reflection per texel, by view and light direction: cloth, pebbles, leather.",
     fixed=("scale", "rotation", "components"),

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from relume.assets.btf.compress import MAX_COMPONENTS, compress, max_texels
+from relume.assets.btf.compress import FLAT, Coders, compress, max_texels
 from relume.assets.btf.direction_rings import directions, make_direction_grid, ubo_grid
+from relume.assets.btf.parallax import compute_shears, visible_texels
 from relume.assets.btf.partial_results import PartialCompression
+from relume.assets.btf.per_view_coder import MAX_COMPONENTS
+from relume.assets.btf.stored_arrays import from_arrays, stored_bytes, to_arrays
 from relume.core.errors import CancelledError, MaterialError
 
 RINGS = ubo_grid()
@@ -30,8 +33,8 @@ class Facets:
         return ((lit * cosines[:, None]).T[..., None] * self._gain).astype(np.float32)
 
 
-def compressed(images, bound=0.01, progress=lambda fraction: None, is_canceled=lambda: False, begun=None):
-    return compress(images, bound, progress, is_canceled, begun)
+def compressed(images, bound=0.01, progress=lambda fraction: None, is_canceled=lambda: False, begun=None, height=FLAT):
+    return compress(images, bound, progress, is_canceled, begun, height)
 
 
 def all_values(images):
@@ -54,11 +57,7 @@ def test_the_reported_error_is_the_error_of_the_stored_values():
 def test_a_looser_bound_takes_less_memory():
     images = Facets(kinds=30)
     tight, loose = compressed(images, 0.01), compressed(images, 0.2)
-    assert loose.num_bytes < tight.num_bytes
-    assert loose.bits.max() < tight.bits.max()
-    assert list(loose.bits) == sorted(loose.bits, reverse=True)  # the strongest components have the finest steps
-    for btf in (loose, tight):
-        assert (np.abs(btf.weight).max(axis=(0, 1)) == 2 ** (btf.bits.astype(int) - 1) - 1).all()
+    assert stored_bytes(loose) < stored_bytes(tight)
     assert loose.error[-1] <= 0.21
     assert tight.num_components <= MAX_COMPONENTS
 
@@ -90,23 +89,27 @@ def counted(images):
 
 
 def test_a_resumed_compression_gives_the_same_result(tmp_path):
-    images, requested = Facets(kinds=9), []
+    images, polled = Facets(kinds=9), []
     expected = compressed(images)
     with pytest.raises(CancelledError):
         compressed(
             images,
-            is_canceled=lambda: requested.append(0) or len(requested) > 40,
+            is_canceled=lambda: polled.append(0) or len(polled) > 80,
             begun=PartialCompression(tmp_path / "a", {"bound": 0.01}),
         )
-    (tmp_path / "a" / "view-3.npz").write_bytes(b"PK\x03\x04 half written")
+    complete = {int(path.stem.split("-")[1]) for path in (tmp_path / "a").glob("view-*.npz")} - {3}
+    assert 5 < len(complete) < 80
+    (tmp_path / "a" / "view-3-0.01.npz").write_bytes(b"PK\x03\x04 half written")
     read = counted(images)
     btf = compressed(images, begun=PartialCompression(tmp_path / "a", {"bound": 0.01}))
-    assert read == [3, *range(35, 81)]  # five were read to select components, then 35
-    for name in ("cluster", "weight", "bits", "mean", "eigen", "step", "average", "error"):
+    left = [view for view in range(81) if view not in complete]
+    assert read[: len(left)] == left  # the views that select components are not read again
+    assert read[len(left) :] in ([], list(range(81)))  # whole BRDFs
+    for name in ("cluster", "weight", "mean", "mean_step", "eigen", "step", "average", "error"):
         np.testing.assert_array_equal(getattr(btf, name), getattr(expected, name))
     read.clear()
     compressed(images, 0.2, begun=PartialCompression(tmp_path / "a", {"bound": 0.2}))
-    assert len(read) == 5 + 81  # results for another bound are not reused
+    assert len(read) >= 5 + 81  # results for another bound are not reused
 
 
 @pytest.mark.parametrize(("value", "message"), [(np.nan, "non-finite"), (-1.0, "negative"), (np.inf, "non-finite")])
@@ -140,7 +143,7 @@ def test_compression_that_saves_no_memory_is_rejected():
     noise = rng.uniform(size=(81, 256, 3)).astype(np.float32)
     images.get_view = lambda view: noise
     btf = compressed(images, 0.001)
-    assert btf.num_bytes * 2.4 < btf.measured_bytes
+    assert stored_bytes(btf) * 2.4 < btf.measured_bytes
     assert btf.error[-1] > 0.1
 
 
@@ -162,3 +165,65 @@ def test_too_many_texels_for_the_memory_limit_are_rejected_before_reading():
     assert max_texels(81) > 300 * 300
     with pytest.raises(MaterialError, match="the limit for 400 directions is 83,886; scale it down"):
         compressed(Large())
+
+
+class Reliefs(Facets):
+    """Facets on waves: each view shows the texels that its rays meet."""
+
+    def __init__(self, height):
+        super().__init__(kinds=5, size=height.shape)
+        self.height, self._source = height, visible_texels(height, RINGS, height.shape)
+
+    def get_view(self, view):
+        return super().get_view(view)[:, self._source[view]]
+
+
+def waves(size=24):
+    v, u = np.meshgrid(*[(np.arange(size) + 0.5) / size] * 2, indexing="ij")
+    return (0.1 * np.sin(2 * np.pi * u) * np.cos(2 * np.pi * v)).astype(np.float32)
+
+
+def both_coders(images, height, folder):
+    return Coders(images, height, lambda fraction: None, lambda: False, PartialCompression(folder, {}))
+
+
+@pytest.mark.parametrize("coder", ["per_view", "whole_brdfs"])
+def test_each_coder_reports_the_error_of_what_it_stores(coder, tmp_path):
+    images = Reliefs(waves(12))
+    btf, original = getattr(both_coders(images, images.height, tmp_path), coder)(0.03), all_values(images)
+    stored = from_arrays(to_arrays(btf), RINGS, btf.error)
+    decoded = np.stack([stored.texel_brdf(texel) for texel in range(len(original))])
+    error = np.linalg.norm(decoded - original) / np.linalg.norm(original)
+    assert btf.error[-1] == pytest.approx(error, rel=1e-3)
+    assert error <= 0.035
+    for name in ("levels", "cluster", "weight", "mean", "mean_step", "eigen", "step", "average", "height"):
+        np.testing.assert_array_equal(getattr(stored, name), getattr(btf, name))
+    fewer = btf.with_components(1)
+    assert stored_bytes(fewer) < stored_bytes(btf)
+    loaded = from_arrays(to_arrays(fewer), RINGS, fewer.error)
+    np.testing.assert_array_equal(loaded.weight, fewer.weight)
+
+
+def test_the_smaller_of_both_coders_is_taken():
+    """Whole BRDFs for a plane; clusters per view if texels of different views have nothing in common."""
+    flat = Facets(kinds=9, size=(24, 24))
+    btf = compressed(flat, 0.03)
+    assert btf.shared is not None
+    assert btf.error[-1] <= 0.03
+
+    class Unrelated(Facets):
+        def get_view(self, view):
+            return super().get_view(view)[:, np.random.default_rng(view).permutation(self.size[0] * self.size[1])]
+
+    other = compressed(Unrelated(kinds=9, size=(24, 24)), 0.1)
+    assert other.shared is None
+    assert other.error[-1] <= 0.11
+
+
+def test_whole_brdfs_follow_the_relief_by_its_height(tmp_path):
+    images = Reliefs(waves())
+    assert (compute_shears(RINGS)[80] * np.ptp(images.height) * 24).max() > 3  # texels of parallax
+    with_height = both_coders(images, images.height, tmp_path / "a").whole_brdfs(0.03)
+    assert with_height.error[-1] <= 0.03
+    without = both_coders(images, FLAT, tmp_path / "b").whole_brdfs(0.03)
+    assert without is None or stored_bytes(without) > 2 * stored_bytes(with_height)

@@ -8,13 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bit_packer import pack
 from fastapi.testclient import TestClient
 from PIL import Image
 
 from relume.assets.btf import btf_store
-from relume.assets.btf.bit_packing import pack
 from relume.assets.btf.btf_store import STORE, get_record, load_btf, records, store_btf
 from relume.assets.btf.direction_rings import ubo_grid
+from relume.assets.btf.local_pca_btf import SharedTexels
+from relume.assets.btf.parallax import visible_texels
+from relume.assets.btf.stored_arrays import stored_bytes
 from relume.assets.btf.value_cache import ValueFile
 from relume.brdf.term_validation import complete_term
 from relume.core.errors import CancelledError, MaterialError, NotFoundError, ParameterError
@@ -48,26 +51,47 @@ def test_a_look_with_an_unknown_btf_is_rejected(small_btf, data):
         complete_term(("terms", 0), {"model": "measured_btf", "data": data}, None)
 
 
-@pytest.mark.parametrize("array", ["packed", "mean", "eigen", "step", "average", "levels", "height"])
-@pytest.mark.parametrize("how", ["gone", "cut", "shape", "numbers"])
-def test_damaged_files_are_reported(small_btf, tmp_path, array, how):
-    shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / small_btf.record.id)
-    path = tmp_path / small_btf.record.id / f"{array}.npy"
-    values = np.load(path)
-    if how == "gone":
-        path.unlink()
-        if array == "height":  # older stores have none
-            assert btf_store._load(path.parent).height.tolist() == [[0.0]]
-            return
-    elif how == "cut":
-        path.write_bytes(path.read_bytes()[:-5])
-    elif how == "shape":
-        np.save(path, values[:-1])
-    else:
-        np.save(path, np.full_like(values, -1 if array == "levels" else 0) * (
-            np.nan if values.dtype.kind == "f" else 1))  # fmt: skip
-        if array in ("eigen", "packed"):
+def stored_arrays(folder):
+    with np.load(folder / "arrays.npz", allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+@pytest.mark.parametrize("array", ["mean", "mean_step", "eigen", "step", "average", "levels", "height", "weight"])
+@pytest.mark.parametrize("how", ["gone", "shape", "type", "numbers"])
+def test_damaged_arrays_are_reported(small_btf, tmp_path, array, how):
+    at = tmp_path / small_btf.record.id
+    shutil.copytree(small_btf.folder / small_btf.record.id, at)
+    arrays = stored_arrays(at)
+    values = arrays.pop(array)
+    if how == "shape":
+        arrays[array] = values[:-1]
+    elif how == "type":
+        arrays[array] = values.astype(np.float64)
+    elif how == "numbers":
+        arrays[array] = np.full_like(values, -1 if array == "levels" else 0) * (
+            np.nan if values.dtype.kind == "f" else 1)  # fmt: skip
+        if array in ("mean", "eigen", "weight"):
             pytest.skip("any steps are sound")
+    np.savez_compressed(at / "arrays.npz", **arrays)
+    with pytest.raises(MaterialError, match="damaged"):
+        get_record(tmp_path, small_btf.record.id)
+
+
+@pytest.mark.parametrize("keep", [0, 3, 400, -5])
+def test_truncated_files_are_reported(small_btf, tmp_path, keep):
+    at = tmp_path / small_btf.record.id
+    shutil.copytree(small_btf.folder / small_btf.record.id, at)
+    (at / "arrays.npz").write_bytes((at / "arrays.npz").read_bytes()[:keep])
+    with pytest.raises(MaterialError, match="damaged"):
+        get_record(tmp_path, small_btf.record.id)
+
+
+def test_too_many_texels_are_damage_before_they_are_allocated(small_btf, tmp_path):
+    at = tmp_path / small_btf.record.id
+    shutil.copytree(small_btf.folder / small_btf.record.id, at)
+    arrays = stored_arrays(at)
+    arrays["levels"][0] = 0, 1 << 20, 1 << 20
+    np.savez_compressed(at / "arrays.npz", **arrays)
     with pytest.raises(MaterialError, match="damaged"):
         get_record(tmp_path, small_btf.record.id)
 
@@ -77,35 +101,47 @@ def changed(path, **changes):
     path.write_text(json.dumps({key: value for key, value in document.items() if value is not None}))
 
 
-@pytest.mark.parametrize("are_packed", [False, True])
-def test_unpacked_clusters_and_weights_are_still_read(small_btf, tmp_path, are_packed):
+def as_older_store(folder, btf, bits):
+    """Rewrite a folder as older versions did: a file for each array, clusters and weights in few bits."""
+    (folder / "arrays.npz").unlink()
+    for name in ("levels", "mean", "eigen", "step", "average", "height"):
+        np.save(folder / f"{name}.npy", getattr(btf, name))
+    width = np.array([max(1, (btf.mean.shape[1] - 1).bit_length())], np.uint8)
+    rows = np.concatenate(
+        [(btf.cluster - (2 ** (width.astype(int) - 1) - 1)).astype(np.int8)[..., None], btf.weight], 2
+    )
+    np.save(folder / "packed.npy", np.stack([pack(row, np.append(width, bits)) for row in rows]))
+    changed(folder / "btf.json", bits=bits.tolist(), cluster_bits=int(width[0]))
+
+
+@pytest.mark.parametrize("form", ["packed", "unpacked clusters", "unpacked"])
+def test_older_stores_are_still_read(small_btf, tmp_path, form):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
     expected = load_btf(small_btf.record.data)
-    np.save(at / "cluster.npy", expected.cluster)
-    if are_packed:  # only the weights
-        np.save(at / "packed.npy", np.stack([pack(weight, expected.bits) for weight in expected.weight]))
-    else:
+    bits = np.full(expected.num_components, 8, np.uint8)
+    as_older_store(at, expected, bits)
+    if form != "packed":
+        changed(at / "btf.json", cluster_bits=None)
+        np.save(at / "cluster.npy", expected.cluster)
+        np.save(at / "packed.npy", np.stack([pack(weight, bits) for weight in expected.weight]))
+    if form == "unpacked":
         np.save(at / "weight.npy", expected.weight)
         (at / "packed.npy").unlink()
+        (at / "height.npy").unlink()
         changed(at / "btf.json", bits=None)
-    changed(at / "btf.json", cluster_bits=None)
     assert get_record(tmp_path, small_btf.record.id).components == expected.num_components
     btf = btf_store._load(at)
-    np.testing.assert_array_equal(btf.weight, expected.weight)
-    np.testing.assert_array_equal(btf.cluster, expected.cluster)
-    assert btf.bits.tolist() == (expected.bits.tolist() if are_packed else [8] * expected.num_components)
+    for name in ("weight", "cluster", "mean", "eigen", "step", "average", "levels"):
+        np.testing.assert_array_equal(getattr(btf, name), getattr(expected, name))
+    assert btf.height.tolist() == ([[0.0]] if form == "unpacked" else expected.height.tolist())
 
 
 def test_the_reported_bytes_are_the_bytes_on_disk(small_btf):
-    """Except for the coarser levels, headers of 128 bytes, and the average, which lists read."""
-    btf, folder = load_btf(small_btf.record.data), small_btf.folder / small_btf.record.id
-    texels, all_texels = btf.size[0] * btf.size[1], btf.cluster.shape[1]
-    on_disk = {path.stem: path.stat().st_size - 128 for path in folder.glob("*.npy")}
-    assert on_disk["packed"] == pytest.approx(
-        (btf.num_bytes - sum(on_disk[name] for name in ("mean", "eigen", "step", "height"))) * all_texels / texels,
-        abs=2 * len(btf.cluster),
-    )
+    """Except for the coarser levels, a third, and headers of the arrays."""
+    btf, file = load_btf(small_btf.record.data), small_btf.folder / small_btf.record.id / "arrays.npz"
+    assert stored_bytes(btf) < file.stat().st_size < 1.4 * stored_bytes(btf) + 12 * 400
+    assert small_btf.record.ratio == btf.measured_bytes / stored_bytes(btf)
 
 
 @pytest.mark.parametrize(
@@ -116,6 +152,8 @@ def test_the_reported_bytes_are_the_bytes_on_disk(small_btf):
 def test_inconsistent_bit_widths_are_damage(small_btf, tmp_path, changes):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
+    btf = load_btf(small_btf.record.data)
+    as_older_store(at, btf, np.full(btf.num_components, 8, np.uint8))
     changed(at / "btf.json", **changes)
     with pytest.raises(MaterialError, match="damaged"):
         get_record(tmp_path, small_btf.record.id)
@@ -124,7 +162,7 @@ def test_inconsistent_bit_widths_are_damage(small_btf, tmp_path, changes):
 def test_a_damaged_btf_does_not_hide_others_from_lists(small_btf, tmp_path, caplog):
     for name in (small_btf.record.id, "0123456789abcdef"):
         shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / name)
-    (tmp_path / "0123456789abcdef" / "step.npy").unlink()
+    (tmp_path / "0123456789abcdef" / "arrays.npz").unlink()
     assert records(tmp_path) == [small_btf.record]
     assert "0123456789abcdef is damaged" in caplog.text
 
@@ -148,9 +186,9 @@ def test_a_resumed_creation_gives_the_same_result(tmp_path):
     record = synthesize_btf(resumed, wanted, "Corduroy", fractions.append, lambda: False)
     assert fractions[0] == pytest.approx(0.8 * done / 81)
     assert record.id == whole.id
-    for array in [*btf_store._ARRAYS, "packed"]:
-        resumed_array, complete_array = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
-        np.testing.assert_array_equal(resumed_array, complete_array)
+    expected = stored_arrays(at_once / record.id)
+    for name, array in stored_arrays(resumed / record.id).items():
+        np.testing.assert_array_equal(array, expected[name])
 
 
 def test_values_of_another_btf_are_not_reused(tmp_path):
@@ -186,6 +224,9 @@ def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys)
     assert "relative RMS" in words
     assert main(["material", "make-btf", "wool", "--data", str(data)]) == 1
     assert "weave, pebbles, corduroy" in capsys.readouterr().err
+    for both_or_none in (["weave", "--color", "print.png"], []):
+        assert main(["material", "make-btf", *both_or_none, "--data", str(data)]) == 1
+        assert "images by --height and --color" in capsys.readouterr().err
     settings = Settings(data=data, client=tmp_path / "client", allowed_hosts=["testserver"])
     with TestClient(create_app(settings)) as client:
         (listed,) = client.get("/api/materials/btf").json()
@@ -222,8 +263,29 @@ def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys)
 def test_clusters_are_stored_for_any_number_of_clusters(small_btf, tmp_path):
     (source := tmp_path / "five").write_text("5")
     few = load_btf(small_btf.record.data).with_components(2)
-    five = replace(few, **{name: np.repeat(getattr(few, name)[:, :1], 5, axis=1) for name in ("mean", "eigen", "step")},
-                   cluster=np.random.default_rng(0).integers(0, 5, few.cluster.shape).astype(np.uint8))  # fmt: skip
+    tables = {name: np.repeat(getattr(few, name)[:, :1], 5, axis=1) for name in ("mean", "mean_step", "eigen", "step")}
+    cluster = np.random.default_rng(0).integers(0, 5, few.cluster.shape).astype(np.uint8)
+    five = replace(few, **tables, shared=None, cluster=cluster)
     loaded = btf_store._load(tmp_path / store_btf(tmp_path, source, "Five", None, lambda: five).id)
     np.testing.assert_array_equal(loaded.cluster, five.cluster)
     np.testing.assert_array_equal(loaded.weight, five.weight)
+
+
+def test_shared_weights_are_stored_once(small_btf, tmp_path):
+    (source := tmp_path / "shared").write_text("shared")
+    btf = load_btf(small_btf.record.data)
+    num = btf.size[0] * btf.size[1]
+    shared = SharedTexels(btf.cluster[0, :num], btf.weight[0, :num])
+    own, source_texel = (btf.cluster.copy(), btf.weight.copy()), visible_texels(btf.height, btf.grid, btf.size)
+    own[0][:, :num], own[1][:, :num] = shared.cluster[source_texel], shared.weight[source_texel]
+    whole = replace(btf, cluster=own[0], weight=own[1], shared=shared)
+    record = store_btf(tmp_path, source, "Shared", None, lambda: whole)
+    loaded = btf_store._load(tmp_path / record.id)
+    np.testing.assert_array_equal(loaded.cluster, whole.cluster)
+    np.testing.assert_array_equal(loaded.weight, whole.weight)
+    assert stored_arrays(tmp_path / record.id)["weight"].shape[2] == whole.weight.shape[1] - num
+    arrays = {**stored_arrays(tmp_path / record.id), "shared_cluster": shared.cluster[:-1]}
+    np.savez_compressed(tmp_path / record.id / "arrays.npz", **arrays)
+    shutil.copytree(tmp_path / record.id, tmp_path / "0123456789abcdef")
+    with pytest.raises(MaterialError, match="damaged"):
+        get_record(tmp_path, "0123456789abcdef")

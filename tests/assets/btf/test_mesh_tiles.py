@@ -1,14 +1,17 @@
-"""BTFs of small geometries from mesh files."""
+"""BTFs of small geometries from mesh files and from images."""
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, polar, ubo_grid
+from relume.core.color import srgb_decode
 from relume.core.errors import ParameterError, SceneError
 from relume.synthetic_btf.corduroy import corduroy
+from relume.synthetic_btf.from_images import ImageTile
 from relume.synthetic_btf.from_mesh import read_tile
 from relume.synthetic_btf.render import TileGeometry
-from relume.synthetic_btf.synthesize import MESH, SyntheticBtf, synthesize_btf
+from relume.synthetic_btf.synthesize import IMAGES, MESH, SyntheticBtf, synthesize_btf
 
 LIBRARY = "newmtl red\nKd 0.6 0.1 0.1\nKs 0 0 0\nillum 1\nnewmtl green\nKd 0.1 0.5 0.2\nKs 0 0 0\nillum 1\n"
 
@@ -92,3 +95,73 @@ def test_other_colors_are_another_btf(striped):
     assert first == wanted.recipe(wanted.tile())
     (striped.parent / "m.mtl").write_text(LIBRARY.replace("0.6", "0.7"))
     assert wanted.recipe(wanted.tile()) != first
+
+
+def print_image(folder):
+    """Eight by eight random colors, each of one texel."""
+    pixels = np.random.default_rng(6).integers(0, 256, (8, 8, 3)).astype(np.uint8)
+    Image.fromarray(pixels).save(folder / "print.png")
+    return folder / "print.png", srgb_decode((pixels / 255).astype(np.float32)).astype(np.float64)
+
+
+def test_printed_colors_multiply_a_flat_mesh_at_their_uvs(tmp_path):
+    path, colors = print_image(tmp_path)
+    (tmp_path / "m.mtl").write_text(f"newmtl paper\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {path.name}\n")
+    corners = "v 0 0 0\nv 2 0 0\nv 2 0 -2\nv 0 0 -2\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    (tmp_path / "paper.obj").write_text("mtllib m.mtl\n" + corners + "usemtl paper\nf 1/1 2/2 3/3 4/4\n")
+    geometry = TileGeometry(read_tile(tmp_path / "paper.obj", None), ubo_grid(), (8, 8), 1, 1)
+    for view in (0, 40):  # a plane has no parallax, and a matte one looks the same from everywhere
+        values = geometry.get_view(view).reshape(81, 8, 8, 3)
+        expected = colors / np.pi * directions(ubo_grid())[:, None, None, 2:]
+        np.testing.assert_allclose(values, expected, rtol=1e-3, atol=1e-4)
+
+
+def test_images_give_the_same_colors_and_heights(tmp_path):
+    path, colors = print_image(tmp_path)
+    flat = TileGeometry(ImageTile(None, path, 0.02, 1.0).read(), ubo_grid(), (8, 8), 1, 1).get_view(0)
+    gloss = flat.reshape(81, 8, 8, 3) - colors / np.pi * directions(ubo_grid())[:, None, None, 2:]
+    assert gloss.min() > -1e-4
+    assert np.ptp(gloss, axis=(1, 2, 3)).max() < 1e-3  # white, the same everywhere
+    rows, columns = np.meshgrid(np.arange(32), np.arange(32), indexing="ij")
+    heights = (32767 * (1 + np.sin(2 * np.pi * (columns + 0.5) / 32) * np.cos(2 * np.pi * rows / 32))).astype(np.uint16)
+    Image.fromarray(heights).save(tmp_path / "bump.png")
+    tile = ImageTile(tmp_path / "bump.png", path, 0.1, 0.6).read()
+    assert np.ptp(tile.positions[:, 2]) == pytest.approx(0.1, rel=0.01)
+    upper_right = np.argmin(np.abs(tile.positions[:, :2] - [0.25, 0.99]).sum(axis=1))
+    assert tile.positions[upper_right, 2] > 0.09  # the first row of the image is at the top
+    assert tile.normals[:, 2].min() > 0.8
+    relief = TileGeometry(tile, ubo_grid(), (8, 8), 1, 1)
+    assert 0.05 < np.ptp(relief.height()) < 0.1
+    wanted = SyntheticBtf(IMAGES, 8, 1, 0.1, images=ImageTile(tmp_path / "bump.png", path, 0.1, 0.6))
+    other = wanted._replace(images=ImageTile(tmp_path / "bump.png", None, 0.1, 0.6))
+    assert wanted.recipe(tile) == wanted.recipe(wanted.tile()) != other.recipe(other.tile())
+
+
+@pytest.mark.parametrize(
+    ("size", "images", "error", "message"),
+    [
+        ((8, 9), {}, SceneError, "square"),
+        ((8, 8), {"relief": 0.0}, ParameterError, "--relief"),
+        ((8, 8), {"relief": float("nan")}, ParameterError, "--relief"),
+        ((8, 8), {"roughness": 0.0}, ParameterError, "--roughness"),
+        (None, {}, SceneError, "damaged"),
+    ],
+)
+def test_unusable_images_are_rejected(tmp_path, size, images, error, message):
+    path = tmp_path / "bump.png"
+    path.write_bytes(b"no image") if size is None else Image.new("L", size).save(path)
+    values = {"height": path, "color": None, "relief": 0.02, "roughness": 0.6, **images}
+    with pytest.raises(error, match=message):
+        synthesize_btf(
+            tmp_path / "kept", SyntheticBtf(IMAGES, 8, 1, 0.1, images=ImageTile(**values)), "x",
+            lambda fraction: None, lambda: False,
+        )  # fmt: skip
+    assert not (tmp_path / "kept").exists()
+
+
+def test_images_of_roughness_are_rejected(tmp_path):
+    path, _ = print_image(tmp_path)
+    (tmp_path / "m.mtl").write_text(f"newmtl paper\nKd 1 1 1\nPr 0.5\nmap_Pr {path.name}\n")
+    (tmp_path / "a.obj").write_text("mtllib m.mtl\n" + quad(1, 0, 2, 1, "paper"))
+    with pytest.raises(SceneError, match="roughness"):
+        read_tile(tmp_path / "a.obj", None)

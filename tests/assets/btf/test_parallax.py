@@ -5,7 +5,7 @@ import pytest
 from btf_reference import parallax_intersection_numpy
 
 from relume.assets.btf.direction_rings import directions, ubo_grid
-from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection
+from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection, visible_texels
 from relume.synthetic_btf.render import TileGeometry
 from relume.synthetic_btf.weave import weave
 
@@ -38,6 +38,19 @@ def test_the_kernel_equals_the_reference_and_the_ray_relief_intersection(slant):
             share = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - down - fraction[:, 1])
             surface_height += share * relief[(first[:, 1] + down) % 24, (first[:, 0] + right) % 32]
         assert abs(actual - z[np.flatnonzero(z <= surface_height)[0]]) < 4e-4
+
+
+def test_visible_texels_are_those_that_rays_meet():
+    relief, rings = waves(), ubo_grid()
+    visible = visible_texels(relief, rings, (24, 32))
+    assert (visible[0] == np.arange(24 * 32)).all()  # from above
+    for view, texel in np.random.default_rng(4).integers(0, (81, 24 * 32), (60, 2)):
+        uv, shear = np.array([(texel % 32 + 0.5) / 32, (texel // 32 + 0.5) / 24]), compute_shears(rings)[view]
+        met = (uv + parallax_intersection_numpy(relief, uv, shear) * shear * [1, -1]) * [32, 24]
+        at = np.array([visible[view, texel] % 32, visible[view, texel] // 32]) + 0.5
+        offset = (at - met + [16, 12]) % [32, 24] - [16, 12]
+        assert np.abs(offset).max() < 0.51
+    assert (visible_texels(np.zeros((1, 1), np.float32), rings, (3, 5)) == np.arange(15)).all()
 
 
 def test_a_constant_height_gives_that_height():

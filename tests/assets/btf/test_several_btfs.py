@@ -38,7 +38,9 @@ def records(small_btf, tmp_path_factory):
     for number in range(NUM):
         source = folder / f"{number}.txt"
         source.write_text(str(number))
-        dimmed = replace(whole, mean=(whole.mean * (1 - 0.1 * number)).astype(np.float16))
+        factor = np.float32(1 - 0.1 * number)
+        dimmed = replace(whole, mean=(whole.mean * factor).astype(np.float16), mean_step=whole.mean_step * factor,
+                         average=whole.average * factor)  # fmt: skip
         stored.append(store_btf(small_btf.folder, source, f"Cords {number}", None, lambda made=dimmed: made))
     return stored
 
