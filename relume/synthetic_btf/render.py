@@ -61,7 +61,7 @@ class _SurfaceSamples(NamedTuple):
     color: F64
 
     def rows(self, rows: slice) -> _SurfaceSamples:
-        return _SurfaceSamples(*(array[rows] for array in self))
+        return _SurfaceSamples(self.position[rows], self.normal[rows], self.material[rows], self.color[rows])
 
 
 class _LightSamples(NamedTuple):

@@ -90,7 +90,8 @@ class LobePaths(NamedTuple):
         vectors = np.empty((3, num_entries, 3), np.float32)
         texture, emission = np.empty((num_entries, num_slots), np.uint32), np.empty(num_entries, np.uint32)
         first, spread = np.zeros(num_points + 1, np.int64), np.empty(num_entries, np.float32)
-        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, *vectors, spread)
+        throughput, direction, normal = vectors
+        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, throughput, direction, normal, spread)
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
         """Select the paths of some points."""

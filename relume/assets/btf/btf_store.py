@@ -90,7 +90,8 @@ def store_btf(
 
     def fill(staged_folder: Path) -> dict[str, Any]:
         btf = compute()
-        np.savez_compressed(staged_folder / _ARRAYS_FILE, **to_arrays(btf))
+        arrays: dict[str, Any] = to_arrays(btf)
+        np.savez_compressed(staged_folder / _ARRAYS_FILE, **arrays)
         return {
             "synthetic": synthetic,
             "rings": [
@@ -175,7 +176,7 @@ def _load_arrays(file: Path, grid: DirectionGrid, error: tuple[float, ...]) -> L
 
 def _load_packed(path: Path, document: Mapping[str, Any], grid: DirectionGrid, error: tuple[float, ...]) -> LocalPcaBtf:
     """Read an older folder. Raises OSError, ValueError, KeyError, TypeError, EOFError."""
-    arrays = {name: _array(path, name) for name in ("levels", "mean", "eigen", "step", "average")}
+    arrays: dict[str, Any] = {name: _array(path, name) for name in ("levels", "mean", "eigen", "step", "average")}
     height = _array(path, "height") if (path / "height.npy").exists() else np.zeros((1, 1), np.float32)
     cluster, weight = _texels(path, document, arrays["levels"])
     types = {**_TYPES, "mean": np.float16}

@@ -52,7 +52,8 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]], grid: DirectionGrid, error: 
     shared = None
     if "shared_cluster" in arrays:
         shared = SharedTexels(arrays["shared_cluster"], np.ascontiguousarray(arrays["shared_weight"].T))
-        source = visible_texels(arrays["height"], grid, tuple(int(side) for side in arrays["levels"][0, 1:]))
+        height, width = (int(side) for side in arrays["levels"][0, 1:])
+        source = visible_texels(arrays["height"], grid, (height, width))
         cluster = np.concatenate([shared.cluster[source], cluster], axis=1)
         weight = np.concatenate([shared.weight[source], weight], axis=1)
     return LocalPcaBtf(

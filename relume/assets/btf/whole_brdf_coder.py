@@ -149,7 +149,8 @@ def _fit_visible(projected: F32, counts: F32, grams: F32) -> tuple[F32, float]:
     return z, explained
 
 
-_UNREACHABLE = Plan(*(np.zeros(0),) * 5, float("inf"))
+_NONE = np.zeros(0, np.float32)
+_UNREACHABLE = Plan(np.zeros(0, np.uint8), np.zeros((0, 0), np.int8), _NONE, _NONE, _NONE, float("inf"))
 
 
 def make_plan(brdfs: WholeBrdfs, bound: float, poll: Callable[[], object]) -> Plan:
@@ -175,11 +176,11 @@ def make_plan(brdfs: WholeBrdfs, bound: float, poll: Callable[[], object]) -> Pl
 class _Weights(NamedTuple):
     """Exact weights, Σ α² of each cluster and component, n |M|² and members n of each cluster."""
 
-    index: NDArray[np.intp]
+    cluster: NDArray[np.intp]
     weight: F32
     energy: F64
     mean_energy: F64
-    count: F64
+    members: F64
 
 
 def _plan_step(brdfs: WholeBrdfs, clusters: Clusters, target: float) -> Plan:
@@ -208,13 +209,13 @@ def _weights(z: F32, clusters: Clusters) -> _Weights:
 
 def _is_used(brdfs: WholeBrdfs, weights: _Weights, step: float) -> NDArray[np.bool_]:
     """Components that explain more than rounding them would add. (K, C)"""
-    return np.asarray(weights.energy > (brdfs.values + weights.count[:, None]) * step**2 / 12)
+    return np.asarray(weights.energy > (brdfs.values + weights.members[:, None]) * step**2 / 12)
 
 
 def _error(brdfs: WholeBrdfs, weights: _Weights, floor: float, step: float) -> float:
     """Estimated squared error after rounding by δ."""
     used = _is_used(brdfs, weights, step)
-    rounded = brdfs.values * (used.sum() + (weights.count > 0).sum()) + (used * weights.count[:, None]).sum()
+    rounded = brdfs.values * (used.sum() + (weights.members > 0).sum()) + (used * weights.members[:, None]).sum()
     return float(floor + weights.energy[~used].sum() + rounded * step**2 / 12)
 
 
@@ -222,22 +223,22 @@ def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> Plan:
     """Round weights by δ, and estimate the bytes."""
     used = _is_used(brdfs, weights, step)
     largest = np.zeros(weights.energy.shape, np.float32)
-    np.maximum.at(largest, weights.index, np.abs(weights.weight))
+    np.maximum.at(largest, weights.cluster, np.abs(weights.weight))
     weight_step = np.maximum(np.float32(step), largest / INT8_MAX)
-    codes = np.rint(weights.weight / weight_step[weights.index]).astype(np.int8) * used[weights.index]
+    codes = np.rint(weights.weight / weight_step[weights.cluster]).astype(np.int8) * used[weights.cluster]
     eigen_step = np.where(used, step / np.sqrt(np.maximum(weights.energy, 1e-30)), 0).astype(np.float32)
     table_energy = np.append(weights.energy[used], weights.mean_energy)
     table_bits = 0.5 * np.log2(1 + _BITS_OF_NOISE * table_energy / (brdfs.values * step**2))
     weight_bits = [bits_per_symbol(column.astype(int) + INT8_MAX) for column in codes.T]
-    texel_bits = bits_per_symbol(weights.index) + sum(weight_bits)
+    texel_bits = bits_per_symbol(weights.cluster) + sum(weight_bits)
     size = (brdfs.values * table_bits.sum() + len(codes) * texel_bits) / 8
     num = int(used.any(axis=0).sum())
     return Plan(
-        weights.index.astype(np.uint8),
+        weights.cluster.astype(np.uint8),
         np.ascontiguousarray(codes[:, :num]),
         weight_step[:, :num],
         eigen_step[:, :num],
-        (step / np.sqrt(np.maximum(weights.count, 1))).astype(np.float32),
+        (step / np.sqrt(np.maximum(weights.members, 1))).astype(np.float32),
         float(size),
     )
 
@@ -261,22 +262,22 @@ def code_view(
         ridge = _RIDGE * np.diag(np.append(0, np.maximum(np.diag(gram)[1:], 1e-30)))
         fitted = np.linalg.solve(gram + ridge, factors.T @ rows[members])
         mean[k], eigen[k] = fitted[0], fitted[1:]
-    coarse = [level.reshape(-1, span.z.shape[1]) for level in build_mip_levels(span.z, size)[1:]]
-    coarse = np.concatenate([span.z[:0], *coarse])
+    levels = [level.reshape(-1, span.z.shape[1]) for level in build_mip_levels(span.z, size)[1:]]
+    coarse = np.concatenate([span.z[:0], *levels])
     coarse_mean, coarse_eigen, coarse_weight_step = _coarse_cluster(coarse, num)
     weight_step = np.vstack([plan.weight_step, coarse_weight_step])
-    mean, mean_step, eigen_codes, eigen_step = round_tables(
+    mean_codes, mean_step, eigen_codes, eigen_step = round_tables(
         np.vstack([mean, coarse_mean @ span.basis + span.center]),
         np.concatenate([eigen, (coarse_eigen @ span.basis)[None]]),
         span.center,
         np.append(plan.mean_step, np.float32(0)),
         np.vstack([plan.eigen_step, np.zeros(num, np.float32)]),
     )
-    tables = np.concatenate([(mean - span.center)[:, None], eigen_codes * eigen_step[..., None]], axis=1)
+    tables = np.concatenate([(mean_codes - span.center)[:, None], eigen_codes * eigen_step[..., None]], axis=1)
     coarse_index, coarse_codes = _fit_texels(coarse, (tables @ span.basis.T).astype(np.float32), weight_step)
     by_light = (rows.shape[1] // 3, 3)
     compressed_view = CompressedView(
-        np.concatenate([index, coarse_index]), np.concatenate([codes, coarse_codes]), mean.reshape(-1, *by_light),
+        np.concatenate([index, coarse_index]), np.concatenate([codes, coarse_codes]), mean_codes.reshape(-1, *by_light),
         mean_step, eigen_codes.reshape(num_clusters + 1, num, *by_light), eigen_step * weight_step,
         span.center.reshape(by_light), np.array(span.energy), np.zeros(0),
     )  # fmt: skip

@@ -173,7 +173,7 @@ def _read_brdf(path: Path, label: str) -> RglBrdf:
 
 
 def _num_parts(phi_i: F64) -> int:
-    """How often the measured azimuths fit into a whole turn: symmetric materials are measured in part of it."""
+    """Number of times that the measured azimuths fit into a turn: symmetric materials are measured in part of it."""
     return round(2 * math.pi / max(float(phi_i[-1] - phi_i[0]), 0.1))
 
 

@@ -222,8 +222,7 @@ def lobe_radiance(
     share = max(rays_per_point, _LEAST_POINTS / max(image.num_pixels, 1)) if is_image else 1.0
     rows = np.flatnonzero(image.order < share)
     points, sides = (receivers.without_light(rows), footprint[rows]) if is_image else (receivers, footprint)
-    ray_args, options = (core, lobe.blur), {"is_direct": is_direct}
-    radiance = mean_lobe_radiance(*light_args, points, sides, *ray_args, **options)
+    radiance = mean_lobe_radiance(*light_args, points, sides, core, lobe.blur, is_direct=is_direct)
     if is_image:
         radiance = _share_with_neighbors(radiance, rows, image, receivers, footprint, lobe_width)
     if is_direct:
@@ -231,7 +230,7 @@ def lobe_radiance(
     if image.source is not None and len(scene.surfaces.normals):
         split = _split_points(scene, receivers, image, image.source, radiance)
         points = ShadingPoints(split.points, split.wo, np.empty((len(split.wo), 0), np.uint8))
-        of_points = mean_lobe_radiance(*light_args, points, NO_FOOTPRINT, *ray_args, **options)
+        of_points = mean_lobe_radiance(*light_args, points, NO_FOOTPRINT, core, lobe.blur, is_direct=is_direct)
         if is_direct:
             add_direct_lights(*light_args, points, NO_FOOTPRINT, pattern, emitters, of_points)
         split.average(of_points, radiance)

@@ -30,8 +30,8 @@ def relative_rms(planes, expected, max_theta):
     inside = np.minimum(wi[..., 2], wo[..., 2]) > math.cos(math.radians(max_theta))
     assert is_measured(planes)[inside].all()
     values = np.moveaxis(planes, 0, -1)[inside] * CHANNEL_SCALE
-    truth = expected(wi[inside], wo[inside])
-    return float(np.sqrt(np.mean(((values - truth) / truth) ** 2)))
+    reference = expected(wi[inside], wo[inside])
+    return float(np.sqrt(np.mean(((values - reference) / reference) ** 2)))
 
 
 @pytest.fixture(scope="module")
@@ -82,8 +82,8 @@ def test_anisotropic_rgl_file_becomes_its_mean_over_azimuths(tmp_path):
     wi, wo = (axis[::10, ::10, ::12] for axis in grid_directions())
     inside = np.minimum(wi[..., 2], wo[..., 2]) > math.cos(math.radians(60))
     values = np.moveaxis(planes, 0, -1)[inside] * CHANNEL_SCALE
-    truth = mean(wi[inside], wo[inside])
-    assert np.sqrt(np.mean((values - truth) ** 2) / np.mean(truth**2)) < 0.03
+    reference = mean(wi[inside], wo[inside])
+    assert np.sqrt(np.mean((values - reference) ** 2) / np.mean(reference**2)) < 0.03
 
 
 def test_spectral_weights_are_those_of_the_standard_observer():

@@ -106,7 +106,7 @@ export class WallGuard {
       const step = this.waiting.slice(0, count);
       const way = waypointsOf([from, ...step.map(({ orbit }) => orbit)]);
       const obstacle = await this.trace(way);
-      if (this.waiting[0] !== step[0]) continue; // cancelled meanwhile
+      if (this.waiting[0] !== step[0]) continue; // canceled meanwhile
       if (obstacle?.length != null) this.halt(way, obstacle, (step.at(-1) as { slides: boolean }).slides);
       else {
         this.waiting.splice(0, count);

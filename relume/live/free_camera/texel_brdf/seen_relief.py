@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.btf.compress import build_mip_levels
+from relume.assets.btf.compressed_view import build_mip_levels
 from relume.assets.btf.local_pca_btf import LocalPcaBtf
 from relume.assets.btf.parallax import compute_shears, parallax_intersection
 from relume.core.numba_options import NO_REFCOUNT
