@@ -62,7 +62,11 @@ def gauss_zenith(size: int, least: float = HEMISPHERE) -> Zenith:
 
 
 def angles_between(incident: F64, outgoing: F64, azimuth: F64) -> Angles:
-    """Return the cosines of Angles. azimuth: φi − φo. All broadcast."""
+    """Return the cosines of Angles.
+
+    Args:
+        incident, outgoing: cos θi and cos θo. azimuth: φi − φo. All broadcast.
+    """
     level = incident * outgoing
     across = np.sqrt((1 - incident**2) * (1 - outgoing**2)) * np.cos(azimuth)
     length = np.sqrt(np.maximum(2 * (1 + level + across), 1e-12))
@@ -73,8 +77,12 @@ def angles_between(incident: F64, outgoing: F64, azimuth: F64) -> Angles:
 def fourier_rows(
     brdf: Brdf, outgoing: Shaped[F64, " n"], zenith: Zenith, num_azimuths: int
 ) -> Shaped[F64, "n zenith frequencies"]:
-    """Return 2π times the Fourier coefficients of a BRDF over φi − φo, for at most as many frequencies as zenith
-    angles."""
+    """Return 2π times the Fourier coefficients of a BRDF over φi − φo, for at most as many frequencies as zenith angles.
+
+    Args:
+        brdf: without the cosine. outgoing: cos θo. zenith: quadrature over θi.
+        num_azimuths: over half of the circle.
+    """
     azimuth = np.pi * (np.arange(num_azimuths) + 0.5) / num_azimuths  # half of the circle
     values = brdf(angles_between(zenith.cosine[:, None], outgoing[:, None, None], azimuth))
     frequencies = np.arange(min(num_azimuths, len(zenith.cosine)))
@@ -83,7 +91,12 @@ def fourier_rows(
 
 
 def factorize(brdf: Brdf, zenith: Zenith, num_azimuths: int | None = None) -> list[Frequency]:
-    """Return the SVD of a BRDF by frequency. num_azimuths: over half of the circle; None: twice the zenith angles"""
+    """Return the SVD of a BRDF by frequency.
+
+    Args:
+        brdf: without the cosine. zenith: quadrature over both angles.
+        num_azimuths: over half of the circle; None: twice the zenith angles.
+    """
     rows = fourier_rows(brdf, zenith.cosine, zenith, num_azimuths or 2 * len(zenith.cosine))
     root = np.sqrt(zenith.weight)
     out = []

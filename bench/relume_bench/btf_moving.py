@@ -1,6 +1,6 @@
 """btf.moving_rmse: BTFs as a moving camera shows them, against the geometry itself.
 
-A plane covered with the weave, the pebbles and the corduroy, under the studio and under a clear sky with a sun, from
+A plane covered with the weave, the pebbles and the corduroy, under the studio and under a clear environment with a sun, from
 four cameras between the directions of the BTFs. Compared are moving frames, with hard shadows and without refinement,
 with Mitsuba's paths through the small geometry. The noise is removed.
 """
@@ -35,13 +35,13 @@ from relume_bench.mitsuba import missing
 from relume_bench.standard_error import NoiseCorrectedError, compare_with_passes
 
 _BOUND = 0.05  # of the stored values
-_SKIES = {"studio": studio, "clear sky": clear_day}
+_ENVIRONMENTS = {"studio": studio, "clear environment": clear_day}
 CAMERA_ANGLES = (22.0, 17.0), (22.0, 137.0), (52.0, 200.0), (52.0, 317.0)  # θ and φ, degrees
 _NAME = "btf.moving_rmse"
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Make three BTFs, and compare their moving images with the actual geometry."""
+    """Make three BTFs, and compare their free-camera images with the actual geometry."""
     if (why := missing()) is not None:
         return skipped((_NAME,), "%", why)
     names = ("weave",) if tiny else ("weave", "pebbles", "corduroy")
@@ -53,9 +53,9 @@ def measure(tiny: bool) -> list[Figure]:
         folder_path = Path(folder)
         records = {name: SyntheticBtf(name, values_folder, tiny).save(folder_path, _BOUND) for name in names}
         comparisons = {
-            (name, sky): against_geometry(record, make(), folder_path / f"{name}-{sky}", tiny)
+            (name, environment): against_geometry(record, make(), folder_path / f"{name}-{environment}", tiny)
             for name, record in records.items()
-            for sky, make in _SKIES.items()
+            for environment, make in _ENVIRONMENTS.items()
         }
     return [_figure(comparisons)]
 
@@ -65,28 +65,30 @@ def _figure(comparisons: dict[tuple[str, str], list[NoiseCorrectedError]]) -> Fi
     worst = max((each for row in comparisons.values() for each in row), key=lambda comparison: comparison.error.value)
     context: dict[str, Any] = {
         "from": [f"θ {theta}°, φ {phi}°" for theta, phi in CAMERA_ANGLES],
-        "errors": {f"{name}, {sky}": [each.error.value for each in row] for (name, sky), row in comparisons.items()},
-        "biases": {f"{name}, {sky}": [each.bias.value for each in row] for (name, sky), row in comparisons.items()},
+        "errors": {f"{name}, {environment}": [each.error.value for each in row] for (name, environment), row in comparisons.items()},
+        "biases": {f"{name}, {environment}": [each.bias.value for each in row] for (name, environment), row in comparisons.items()},
         "median": float(np.median([each.error.value for row in comparisons.values() for each in row])),
         "noise": worst.noise,
     }  # fmt: skip
     return Figure(_NAME, 100 * worst.error.value, "%", context, 100 * worst.error.standard_error)
 
 
-def against_geometry(record: BtfRecord, sky: Environment, folder: Path, tiny: bool) -> list[NoiseCorrectedError]:
-    """Compare moving images of a covered plane with the path-traced geometry, for each camera.
+def against_geometry(
+    record: BtfRecord, environment: Environment, folder: Path, tiny: bool
+) -> list[NoiseCorrectedError]:
+    """Compare free-camera images of a covered plane with the path-traced geometry, for each camera.
 
     Args:
-        record: a BTF named like its geometry. sky: the light. folder: for stores, created. tiny: a trial run.
+        record: a BTF named like its geometry. environment: the light. folder: for stores, created. tiny: a trial run.
     """
     size, spp = ((16, 16), 2) if tiny else ((96, 96), 64)
     tile = GEOMETRIES[record.name]()
     folder.mkdir()
-    plane = make_scenes(tile, sky, CAMERA_ANGLES)[0]
+    plane = make_scenes(tile, environment, CAMERA_ANGLES)[0]
     images = moving_images(plane, record, size, folder / "plane.zarr", 60 if tiny else 2000)
     comparisons = []
     for number, (angles, image) in enumerate(zip(CAMERA_ANGLES, images, strict=True)):
-        displaced_scene = make_scenes(tile, sky, [angles])[1]
+        displaced_scene = make_scenes(tile, environment, [angles])[1]
         passes = traced_by_peer(displaced_scene, size, spp, [tile.materials[0]], folder / f"peer{number}")
         comparisons.append(compare_with_passes(image.astype(np.float64), passes))
     return comparisons

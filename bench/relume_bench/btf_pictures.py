@@ -171,14 +171,14 @@ def _from_table(values: ValueFile, lights: Any, receivers: Any, uv: NDArray[np.f
     return out
 
 
-def make_scenes(tile: Any, sky: Environment, angles: Sequence[tuple[float, float]]) -> tuple[Scene, Scene]:
+def make_scenes(tile: Any, dome: Environment, angles: Sequence[tuple[float, float]]) -> tuple[Scene, Scene]:
     """A plane to cover, and the actual geometry, both Y up, viewed from far away by a camera for each θ and φ.
 
     Args:
-        tile: one period. sky: its upper half lights both; the BTF has no light from below, which gaps of the geometry
+        tile: one period. dome: its upper half lights both; the BTF has no light from below, which gaps of the geometry
             would let through. angles: of the cameras, degrees.
     """
-    radiance = np.array(sky.radiance)
+    radiance = np.array(dome.radiance)
     radiance[len(radiance) // 2 :] = 0
     environment, material = Environment("sky", radiance), (Material("Cloth", tile.materials[0]),)
     cameras = [_far_camera(f"camera{number or ''}", *pair) for number, pair in enumerate(angles)]

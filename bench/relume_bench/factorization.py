@@ -119,7 +119,11 @@ def _sphere_figures(size: int) -> list[Figure]:
 
 
 def harmonic(degree: int, m: int, cosine: F64) -> F64:
-    """Return the part of Y_lm over the zenith angle, orthonormal over the sphere with an orthonormal part over φ."""
+    """Return the part of Y_lm over the zenith angle, orthonormal over the sphere with an orthonormal part over φ.
+
+    Args:
+        degree, m: l and m. cosine: cos θ.
+    """
     return np.asarray(np.sqrt(2 * np.pi) * sph_legendre_p(degree, m, np.arccos(cosine))[0])
 
 

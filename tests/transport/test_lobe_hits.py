@@ -144,7 +144,7 @@ def test_wide_lobes_store_where_they_are_lit(geometry, lookup, points):
     np.testing.assert_allclose(paths.normal[lit], [[0, -1, 0]] * np.count_nonzero(lit), atol=1e-6)
 
 
-def test_beams_spread_where_they_meet_a_curved_surface(geometry, lookup, points):
+def test_ray_footprints_grow_where_they_meet_a_curved_surface(geometry, lookup, points):
     pattern, spread = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7), {}
     for curvature in (0.0, 3.0):
         surfaces = polished_ceiling(0.1, curvature)

@@ -22,7 +22,7 @@ from relume.assets.btf.parallax import visible_texels
 from relume.assets.btf.partial_results import Arrays, PartialCompression, as_arrays
 from relume.assets.btf.per_view_coder import PcaChoice, choose_pca, compress_view
 from relume.assets.btf.stored_arrays import stored_bytes
-from relume.assets.btf.whole_brdf_coder import Plan, WholeBrdfs, code_view, make_plan, project_brdfs
+from relume.assets.btf.whole_brdf_coder import CodePlan, WholeBrdfs, code_view, make_plan, project_brdfs
 from relume.core.errors import CancelledError, MaterialError
 
 F32 = NDArray[np.float32]
@@ -117,7 +117,7 @@ class Coders:
         )
         brdfs = WholeBrdfs(arrays["z"], *(arrays[name].item() for name in WholeBrdfs._fields[1:]))
         arrays = self._partial.load_or_compute(f"plan-{bound}", lambda: as_arrays(make_plan(brdfs, bound, self._poll)))
-        plan = Plan(**{**arrays, "size": arrays["size"].item()})
+        plan = CodePlan(**{**arrays, "size": arrays["size"].item()})
         if not plan.size < max_bytes:
             return None
         views = []
@@ -159,7 +159,7 @@ class Coders:
         rows = view_rows(self._images, view)
         return as_arrays(compress_view(rows, self._span(view, rows), self._images.size, choice, view))
 
-    def _whole_brdfs(self, plan: Plan, source: NDArray[np.int32], view: int) -> Arrays:
+    def _whole_brdfs(self, plan: CodePlan, source: NDArray[np.int32], view: int) -> Arrays:
         rows = view_rows(self._images, view)
         return as_arrays(code_view(rows, self._span(view, rows), self._images.size, plan, source))
 

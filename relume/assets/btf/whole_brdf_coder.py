@@ -72,7 +72,7 @@ class WholeBrdfs(NamedTuple):
     values: int
 
 
-class Plan(NamedTuple):
+class CodePlan(NamedTuple):
     """Clusters and rounded weights of all texels.
 
     Attributes:
@@ -150,10 +150,10 @@ def _fit_visible(projected: F32, counts: F32, grams: F32) -> tuple[F32, float]:
 
 
 _NONE = np.zeros(0, np.float32)
-_UNREACHABLE = Plan(np.zeros(0, np.uint8), np.zeros((0, 0), np.int8), _NONE, _NONE, _NONE, float("inf"))
+_UNREACHABLE = CodePlan(np.zeros(0, np.uint8), np.zeros((0, 0), np.int8), _NONE, _NONE, _NONE, float("inf"))
 
 
-def make_plan(brdfs: WholeBrdfs, bound: float, poll: Callable[[], object]) -> Plan:
+def make_plan(brdfs: WholeBrdfs, bound: float, poll: Callable[[], object]) -> CodePlan:
     """Choose the clusters and the step that meet an error bound with the smallest size.
 
     Args:
@@ -183,7 +183,7 @@ class _Weights(NamedTuple):
     members: F64
 
 
-def _plan_step(brdfs: WholeBrdfs, clusters: Clusters, target: float) -> Plan:
+def _plan_step(brdfs: WholeBrdfs, clusters: Clusters, target: float) -> CodePlan:
     """Find the largest δ that leaves at most `target` of squared error."""
     weights = _weights(brdfs.z, clusters)
     floor = brdfs.residual + float(residual_energy(brdfs.z, clusters)[-1])
@@ -219,7 +219,7 @@ def _error(brdfs: WholeBrdfs, weights: _Weights, floor: float, step: float) -> f
     return float(floor + weights.energy[~used].sum() + rounded * step**2 / 12)
 
 
-def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> Plan:
+def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> CodePlan:
     """Round weights by δ, and estimate the bytes."""
     used = _is_used(brdfs, weights, step)
     largest = np.zeros(weights.energy.shape, np.float32)
@@ -233,7 +233,7 @@ def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> Plan:
     texel_bits = bits_per_symbol(weights.cluster) + sum(weight_bits)
     size = (brdfs.values * table_bits.sum() + len(codes) * texel_bits) / 8
     num = int(used.any(axis=0).sum())
-    return Plan(
+    return CodePlan(
         weights.cluster.astype(np.uint8),
         np.ascontiguousarray(codes[:, :num]),
         weight_step[:, :num],
@@ -244,7 +244,7 @@ def _plan(brdfs: WholeBrdfs, weights: _Weights, step: float) -> Plan:
 
 
 def code_view(
-    rows: F32, span: Span, size: tuple[int, int], plan: Plan, source: Shaped[I32, " texels"]
+    rows: F32, span: Span, size: tuple[int, int], plan: CodePlan, source: Shaped[I32, " texels"]
 ) -> CompressedView:
     """Fit the tables of one view to its values, and round them.
 

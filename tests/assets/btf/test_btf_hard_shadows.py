@@ -38,7 +38,7 @@ def free_bake(tmp_path_factory):
 
 
 def sunlit(bake, record=None, material="Floor"):
-    """Direct light of a sun and the sky, with a BTF on one material."""
+    """Direct light of a sun and the environment, with a BTF on one material."""
     document = copy.deepcopy(complete({}, bake.default_look))
     document["transport"]["show"] = "direct"
     document["lights"] = {"Sun": SUN}
@@ -84,4 +84,4 @@ def test_texels_in_a_sharp_shadow_are_as_dark_as_in_a_fixed_view(free_bake, smal
         ratios.append(image[in_shadow].mean() / expected[in_shadow].mean())
         assert image[in_shadow].mean() < 0.25 * image[in_sun].mean()
         assert np.linalg.norm((image - expected)[on_floor]) < 0.1 * np.linalg.norm(expected[on_floor])
-    assert ratios[1] == pytest.approx(ratios[0], rel=0.05)  # the sky under the sheet is as coarse as for gray
+    assert ratios[1] == pytest.approx(ratios[0], rel=0.05)  # the environment under the sheet is as coarse as for gray

@@ -1,4 +1,4 @@
-"""Memory of BTFs: what is told is what they take, and looks that cannot fit are refused before anything is loaded."""
+"""Memory of BTFs: what is stated is what they take, and looks that cannot fit are refused before anything is loaded."""
 
 import pytest
 
@@ -11,20 +11,20 @@ from relume.core.memory_usage import live_bytes
 from relume.live.free_camera.texel_brdf.texel_tables import compute_texel_tables
 
 
-def told_bytes(record):
+def stated_bytes(record):
     return memory_bytes(record.size, record.directions, record.clusters, record.components)
 
 
-def test_told_memory_is_what_a_btf_takes(small_btf):
+def test_stated_memory_is_what_a_btf_takes(small_btf):
     whole = load_btf(small_btf.record.data)
     actual = (
         whole.cluster.nbytes + whole.weight.nbytes + whole.tables().nbytes + live_bytes(compute_texel_tables(whole))
     )
-    assert told_bytes(small_btf.record) == pytest.approx(actual, rel=0.05)
+    assert stated_bytes(small_btf.record) == pytest.approx(actual, rel=0.05)
 
 
 def test_looks_whose_btfs_exceed_the_budget_are_refused_in_a_sentence(small_btf, monkeypatch):
-    needed = told_bytes(small_btf.record)
+    needed = stated_bytes(small_btf.record)
     terms = [{"model": "lambert"}, *small_btf.record.terms(), *small_btf.record.terms()]
     monkeypatch.setattr(caches._AssetCache, "cache", Cache(needed))
     check_btfs_fit(terms)  # one BTF on two materials takes its memory once
@@ -34,6 +34,6 @@ def test_looks_whose_btfs_exceed_the_budget_are_refused_in_a_sentence(small_btf,
         check_btfs_fit(terms)
 
 
-def test_five_large_btfs_are_told_before_they_are_used():
+def test_memory_of_five_large_btfs_is_stated_before_they_are_used():
     """512 × 512 texels and 81 directions, as compressed to 5 %."""
     assert 5 * memory_bytes((512, 512), 81, 16, 16) == pytest.approx(6.1e9, rel=0.05)

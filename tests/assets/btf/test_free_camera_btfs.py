@@ -15,7 +15,6 @@ from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
-from relume.live.free_camera.texel_brdf.seen_relief import NUM_FETCHES, height_seen, see_relief
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import (
     BtfMaterials,
@@ -24,6 +23,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import (
     pack_lanes,
 )
 from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight, TexelSource
+from relume.live.free_camera.texel_brdf.visible_relief import NUM_FETCHES, see_relief, visible_height
 from relume.look import validate
 from relume.math.zernike import basis_functions, recurrence
 from relume.output.render_image import render_image
@@ -96,8 +96,8 @@ def factors(numbers, axes):
     return out
 
 
-def height_seen_numpy(relief, view, uv, wo):
-    """Reference of `height_seen` at the finest level."""
+def visible_height_numpy(relief, view, uv, wo):
+    """Reference of `visible_height` at the finest level."""
     change = (wo[:2] / wo[2] - relief.shear[view]) * [1, -1]
     (_, rows, columns), height = relief.levels[0], float(relief.lowest + 255 * relief.step)
     for _ in range(NUM_FETCHES):
@@ -115,7 +115,7 @@ def shade_ray_numpy(cover, d, position):
     wo, uv, total = -(axes @ d), SCALE * np.array([across @ position, -up @ position]), np.zeros(3)
     light = pack_lanes(basis_functions(axes @ TO_LIGHT))
     view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, wo[None])
-    height = height_seen_numpy(tables.relief, view[0, of_view[0].argmax()], uv, wo)
+    height = visible_height_numpy(tables.relief, view[0, of_view[0].argmax()], uv, wo)
     for side, weight in zip(view[0], of_view[0], strict=True):
         column, row = size * (uv + height * (wo[:2] / wo[2] - tables.relief.shear[side]) * [1, -1]) - 0.5
         numbers = np.zeros(tables.step.shape[1])
@@ -250,19 +250,19 @@ def test_view_directions_see_the_relief(small_btf):
     whole = load_btf(small_btf.record.data)
     relief, shears = texel_tables.compute_texel_tables(whole).relief, compute_shears(whole.grid)
     rows, columns = whole.size
-    seen = relief.lowest + relief.step * relief.height.astype(np.float64)
+    heights = relief.lowest + relief.step * relief.height.astype(np.float64)
     for view, texel in ((0, 5), (3, 100), (40, 77), (80, 200), (80, 13)):
         center = (np.array([texel % columns, texel // columns]) + 0.5) / [columns, rows]
         expected = parallax_intersection_numpy(whole.height, center, shears[view].astype(np.float64))
-        assert seen[view, texel] == pytest.approx(expected, abs=0.51 * float(relief.step) + 1e-5)
-    finest = seen[:, : rows * columns].reshape(len(shears), rows, columns)
+        assert heights[view, texel] == pytest.approx(expected, abs=0.51 * float(relief.step) + 1e-5)
+    finest = heights[:, : rows * columns].reshape(len(shears), rows, columns)
     means = 0.25 * sum(finest[:, a::2, b::2] for a in (0, 1) for b in (0, 1))
-    second = seen[:, rows * columns : rows * columns * 5 // 4].reshape(means.shape)
+    second = heights[:, rows * columns : rows * columns * 5 // 4].reshape(means.shape)
     np.testing.assert_allclose(second, means, atol=1.01 * relief.step)
 
 
 def test_relief_is_found_between_view_directions(small_btf):
-    """Where a stored view shows what a ray meets: near the point that a march along the ray finds."""
+    """A stored view shows what a ray meets near the point that a march along the ray finds."""
     whole, rng = load_btf(small_btf.record.data), np.random.default_rng(5)
     relief, shears, (rows, columns) = see_relief(whole, whole.levels), compute_shears(whole.grid), whole.size
     found, missed = [], []
@@ -271,8 +271,8 @@ def test_relief_is_found_between_view_directions(small_btf):
         height = parallax_intersection_numpy(whole.height, uv, wo[:2] / wo[2])
         view = interpolation_weights_numpy(whole.grid, wo[None])[0][0, 0]
         change = (wo[:2] / wo[2] - shears[view]) * [1, -1]
-        seen = height_seen.py_func(relief, 0, view, *np.float32(uv), *np.float32(wo[:2] / wo[2]))
-        found.append(np.linalg.norm((seen - height) * change * [columns, rows]))
+        found_height = visible_height.py_func(relief, 0, view, *np.float32(uv), *np.float32(wo[:2] / wo[2]))
+        found.append(np.linalg.norm((found_height - height) * change * [columns, rows]))
         missed.append(np.linalg.norm(height * change * [columns, rows]))
     assert np.median(found) < 0.1
     assert np.mean(found) < 0.5 * np.mean(missed)

@@ -32,7 +32,6 @@ from relume.live.free_camera.texel_brdf.lanes import (
     integrate,
     pack_secondary_axes,
 )
-from relume.live.free_camera.texel_brdf.seen_relief import height_seen
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial, TexelTables
 from relume.live.free_camera.texel_brdf.texture_coordinates import (
     AZIMUTH,
@@ -58,6 +57,7 @@ from relume.live.free_camera.texel_brdf.texture_frame_light import (
     TexelSource,
     rotation_from_vector,
 )
+from relume.live.free_camera.texel_brdf.visible_relief import visible_height
 from relume.probes.stored_scene import StoredScene
 from relume.transport.btf_kernel import linear_taps
 
@@ -239,7 +239,7 @@ def _fetch_texels(tables, direction_grid, num_rays, scratch):  # type: ignore[no
         for k in range(1, NUM_VIEWS):
             if view_weight[k] > view_weight[nearest]:
                 nearest = k
-        h = height_seen(relief, level, view[nearest], columns[U + j], columns[V + j], shear_u, shear_v)
+        h = visible_height(relief, level, view[nearest], columns[U + j], columns[V + j], shear_u, shear_v)
         for k in range(NUM_VIEWS):
             views[NUM_VIEWS * j + k], view_weights[NUM_VIEWS * j + k] = view[k], view_weight[k]
             first = TEXELS_PER_VIEW * (NUM_VIEWS * j + k)

@@ -34,7 +34,7 @@ from relume.live.free_camera.texel_brdf.coefficient_packing import (
     NUM_FUNCTIONS,
     WIDTH,
 )
-from relume.live.free_camera.texel_brdf.seen_relief import SeenRelief, see_relief
+from relume.live.free_camera.texel_brdf.visible_relief import VisibleRelief, see_relief
 from relume.math.zernike import basis_functions
 
 F32 = NDArray[np.float32]
@@ -61,7 +61,7 @@ class TexelTables(NamedTuple):
     weight: Shaped[NDArray[np.int8], "views texels 24"]
     step: Shaped[F32, "views 24"]
     axes: Shaped[F32, "3 3"]
-    relief: SeenRelief
+    relief: VisibleRelief
 
 
 class BtfMaterial(NamedTuple):

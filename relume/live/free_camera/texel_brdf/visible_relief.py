@@ -32,7 +32,7 @@ _MAX_TEXELS = 1 << 16  # of the finest level: rays through more take seconds, an
 _MAX_BYTE = 255
 
 
-class SeenRelief(NamedTuple):
+class VisibleRelief(NamedTuple):
     """Heights that each view direction sees.
 
     Attributes:
@@ -64,7 +64,7 @@ def _trace_texels(relief, lowest, highest, shear, out):  # type: ignore[no-untyp
             out[row, column] = parallax_intersection(relief, lowest, highest, np.float32(u), np.float32(v), shear)
 
 
-def see_relief(pca_btf: LocalPcaBtf, levels: Shaped[NDArray[np.int32], "levels 3"]) -> SeenRelief:
+def see_relief(pca_btf: LocalPcaBtf, levels: Shaped[NDArray[np.int32], "levels 3"]) -> VisibleRelief:
     """Trace the heights that each view direction sees, and average them to mip levels.
 
     Args:
@@ -73,28 +73,28 @@ def see_relief(pca_btf: LocalPcaBtf, levels: Shaped[NDArray[np.int32], "levels 3
     shear, lowest, highest = compute_shears(pca_btf.grid), pca_btf.height.min(), pca_btf.height.max()
     skip = int(np.argmax(levels[:, 1].astype(np.int64) * levels[:, 2] <= (_MAX_TEXELS if highest > lowest else 1)))
     size, num_views = (int(levels[skip, 1]), int(levels[skip, 2])), len(shear)
-    seen = np.empty((num_views, *size), np.float32)
+    heights = np.empty((num_views, *size), np.float32)
 
     def trace(start: int, stop: int) -> None:
         for view in range(start, stop):
             direction = shear[view, 0], shear[view, 1]
-            _trace_texels(pca_btf.height, lowest, highest, direction, seen[view])
+            _trace_texels(pca_btf.height, lowest, highest, direction, heights[view])
 
     for_ranges(trace, num_views, 1)
     step = max(highest - lowest, np.float32(1e-20)) / np.float32(_MAX_BYTE)
-    mip_levels = build_mip_levels(np.ascontiguousarray(seen.reshape(num_views, -1).T), size)
+    mip_levels = build_mip_levels(np.ascontiguousarray(heights.reshape(num_views, -1).T), size)
     steps = np.concatenate([level.reshape(-1, num_views) for level in mip_levels]).T - lowest
     stored_levels = np.ascontiguousarray(levels[skip:] - [levels[skip, 0], 0, 0], np.int32)
     height, max_slope = np.rint(steps / step).astype(np.uint8), np.float32(np.linalg.norm(shear, axis=1).max())
-    return SeenRelief(stored_levels, skip, np.ascontiguousarray(height), lowest, step, shear, max_slope)
+    return VisibleRelief(stored_levels, skip, np.ascontiguousarray(height), lowest, step, shear, max_slope)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def height_seen(relief, level, view, u, v, shear_u, shear_v):  # type: ignore[no-untyped-def]
+def visible_height(relief, level, view, u, v, shear_u, shear_v):  # type: ignore[no-untyped-def]
     """Find the height of what a ray meets, as a view direction near it sees it.
 
     Args:
-        relief: the `SeenRelief`. level: mip level of the BTF. view: index of the view direction.
+        relief: the `VisibleRelief`. level: mip level of the BTF. view: index of the view direction.
         u, v: crossing of the ray with the plane, in repeats, [0, 1). shear_u, shear_v: s of the ray.
     """
     stored_level = min(max(level - relief.skip, 0), relief.levels.shape[0] - 1)
