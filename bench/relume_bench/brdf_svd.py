@@ -77,7 +77,7 @@ def angles_between(incident: F64, outgoing: F64, azimuth: F64) -> Angles:
 def fourier_rows(
     brdf: Brdf, outgoing: Shaped[F64, " n"], zenith: Zenith, num_azimuths: int
 ) -> Shaped[F64, "n zenith frequencies"]:
-    """Return 2π times the Fourier coefficients of a BRDF over φi − φo, for at most as many frequencies as zenith angles.
+    """Return 2π times the Fourier coefficients of a BRDF over φi − φo, for as many frequencies as zenith angles.
 
     Args:
         brdf: without the cosine. outgoing: cos θo. zenith: quadrature over θi.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import KDTree
 
-from relume.synthetic_btf.from_images import ImageTile
+from relume.synthetic_btf.from_images import ReliefTile
 from relume.synthetic_btf.tileable_geometry import Tile
 
 F64 = NDArray[np.float64]
@@ -73,4 +73,4 @@ def _tile(height: F64 | None, colors: F64, relief: float, roughness: float) -> T
             unit = (height - height.min()) / np.ptp(height)
             Image.fromarray(np.rint(65535 * unit).astype(np.uint16)).save(height_path)
         Image.fromarray(np.rint(255 * colors.clip(0, 1)).astype(np.uint8)).save(color_path)
-        return ImageTile(None if height is None else height_path, color_path, relief, roughness).read()
+        return ReliefTile(None if height is None else height_path, color_path, relief, roughness).read()

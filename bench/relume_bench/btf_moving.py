@@ -1,7 +1,7 @@
 """btf.moving_rmse: BTFs as a moving camera shows them, against the geometry itself.
 
-A plane covered with the weave, the pebbles and the corduroy, under the studio and under a clear environment with a sun, from
-four cameras between the directions of the BTFs. Compared are moving frames, with hard shadows and without refinement,
+A plane covered with the weave, the pebbles and the corduroy, under the studio and under an environment with a
+sun, from four cameras between the directions of the BTFs. Compared are moving frames, with hard shadows and without refinement,
 with Mitsuba's paths through the small geometry. The noise is removed.
 """
 
@@ -65,8 +65,8 @@ def _figure(comparisons: dict[tuple[str, str], list[NoiseCorrectedError]]) -> Fi
     worst = max((each for row in comparisons.values() for each in row), key=lambda comparison: comparison.error.value)
     context: dict[str, Any] = {
         "from": [f"θ {theta}°, φ {phi}°" for theta, phi in CAMERA_ANGLES],
-        "errors": {f"{name}, {environment}": [each.error.value for each in row] for (name, environment), row in comparisons.items()},
-        "biases": {f"{name}, {environment}": [each.bias.value for each in row] for (name, environment), row in comparisons.items()},
+        "errors": {", ".join(key): [each.error.value for each in row] for key, row in comparisons.items()},
+        "biases": {", ".join(key): [each.bias.value for each in row] for key, row in comparisons.items()},
         "median": float(np.median([each.error.value for row in comparisons.values() for each in row])),
         "noise": worst.noise,
     }  # fmt: skip

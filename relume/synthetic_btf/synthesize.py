@@ -20,7 +20,7 @@ from relume.assets.btf.partial_results import PartialCompression
 from relume.assets.btf.value_cache import ValueFile
 from relume.core.errors import ParameterError
 from relume.synthetic_btf.corduroy import corduroy
-from relume.synthetic_btf.from_images import ImageTile
+from relume.synthetic_btf.from_images import ReliefTile
 from relume.synthetic_btf.from_mesh import read_tile
 from relume.synthetic_btf.pebbles import pebbles
 from relume.synthetic_btf.render import TileGeometry
@@ -55,7 +55,7 @@ class SyntheticBtf(NamedTuple):
     bound: float
     file: Path | None = None
     period: float | None = None
-    images: ImageTile | None = None
+    images: ReliefTile | None = None
 
     def check(self) -> None:
         """Raise ParameterError if a value is out of range."""

@@ -41,14 +41,14 @@ def material_make_btf(
     """
     from relume.assets.asset_store import check_name
     from relume.core.errors import ParameterError
-    from relume.synthetic_btf.from_images import ImageTile
+    from relume.synthetic_btf.from_images import ReliefTile
     from relume.synthetic_btf.synthesize import GEOMETRIES, IMAGES, MESH, SyntheticBtf, synthesize_btf
     from relume_cli.data_folder import open_settings
     from relume_cli.interrupts import until_interrupted
     from relume_cli.material.messages import print_btf
     from relume_worker.paths import btfs_path
 
-    images = None if height is None and color is None else ImageTile(height, color, relief, roughness)
+    images = None if height is None and color is None else ReliefTile(height, color, relief, roughness)
     if (geometry is None) == (images is None):
         raise ParameterError("geometry", geometry, "either a geometry, or images by --height and --color")
     file = None if geometry is None or geometry in GEOMETRIES or not Path(geometry).suffix else Path(geometry)

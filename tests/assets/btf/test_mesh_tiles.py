@@ -8,7 +8,7 @@ from relume.assets.btf.direction_rings import directions, interpolation_weights_
 from relume.core.color import srgb_decode
 from relume.core.errors import ParameterError, SceneError
 from relume.synthetic_btf.corduroy import corduroy
-from relume.synthetic_btf.from_images import ImageTile
+from relume.synthetic_btf.from_images import ReliefTile
 from relume.synthetic_btf.from_mesh import read_tile
 from relume.synthetic_btf.render import TileGeometry
 from relume.synthetic_btf.synthesize import IMAGES, MESH, SyntheticBtf, synthesize_btf
@@ -118,22 +118,22 @@ def test_printed_colors_multiply_a_flat_mesh_at_their_uvs(tmp_path):
 
 def test_images_give_the_same_colors_and_heights(tmp_path):
     path, colors = print_image(tmp_path)
-    flat = TileGeometry(ImageTile(None, path, 0.02, 1.0).read(), ubo_grid(), (8, 8), 1, 1).get_view(0)
+    flat = TileGeometry(ReliefTile(None, path, 0.02, 1.0).read(), ubo_grid(), (8, 8), 1, 1).get_view(0)
     gloss = flat.reshape(81, 8, 8, 3) - colors / np.pi * directions(ubo_grid())[:, None, None, 2:]
     assert gloss.min() > -1e-4
     assert np.ptp(gloss, axis=(1, 2, 3)).max() < 1e-3  # white, the same everywhere
     rows, columns = np.meshgrid(np.arange(32), np.arange(32), indexing="ij")
     heights = (32767 * (1 + np.sin(2 * np.pi * (columns + 0.5) / 32) * np.cos(2 * np.pi * rows / 32))).astype(np.uint16)
     Image.fromarray(heights).save(tmp_path / "bump.png")
-    tile = ImageTile(tmp_path / "bump.png", path, 0.1, 0.6).read()
+    tile = ReliefTile(tmp_path / "bump.png", path, 0.1, 0.6).read()
     assert np.ptp(tile.positions[:, 2]) == pytest.approx(0.1, rel=0.01)
     upper_right = np.argmin(np.abs(tile.positions[:, :2] - [0.25, 0.99]).sum(axis=1))
     assert tile.positions[upper_right, 2] > 0.09  # the first row of the image is at the top
     assert tile.normals[:, 2].min() > 0.8
     relief = TileGeometry(tile, ubo_grid(), (8, 8), 1, 1)
     assert 0.05 < np.ptp(relief.height()) < 0.1
-    wanted = SyntheticBtf(IMAGES, 8, 1, 0.1, images=ImageTile(tmp_path / "bump.png", path, 0.1, 0.6))
-    other = wanted._replace(images=ImageTile(tmp_path / "bump.png", None, 0.1, 0.6))
+    wanted = SyntheticBtf(IMAGES, 8, 1, 0.1, images=ReliefTile(tmp_path / "bump.png", path, 0.1, 0.6))
+    other = wanted._replace(images=ReliefTile(tmp_path / "bump.png", None, 0.1, 0.6))
     assert wanted.recipe(tile) == wanted.recipe(wanted.tile()) != other.recipe(other.tile())
 
 
@@ -153,7 +153,7 @@ def test_unusable_images_are_rejected(tmp_path, size, images, error, message):
     values = {"height": path, "color": None, "relief": 0.02, "roughness": 0.6, **images}
     with pytest.raises(error, match=message):
         synthesize_btf(
-            tmp_path / "kept", SyntheticBtf(IMAGES, 8, 1, 0.1, images=ImageTile(**values)), "x",
+            tmp_path / "kept", SyntheticBtf(IMAGES, 8, 1, 0.1, images=ReliefTile(**values)), "x",
             lambda fraction: None, lambda: False,
         )  # fmt: skip
     assert not (tmp_path / "kept").exists()
