@@ -22,7 +22,7 @@ _GRAY = (0.5, 0.5, 0.5)  # without an image of colors
 _SQUARE_TOLERANCE = 0.02  # relative difference between the sides of an image that counts as a square
 
 
-class ImageTile(NamedTuple):
+class ReliefTile(NamedTuple):
     """Images of one period, seen from above, that continue across opposite sides.
 
     Attributes:
