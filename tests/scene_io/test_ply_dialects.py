@@ -152,7 +152,7 @@ def test_a_truncated_file_has_its_complete_faces() -> None:
 def test_faces_out_of_range_are_left_out() -> None:
     scene = imported(header(FACES.replace("face 1", "face 2")) + ROWS + "4 0 1 2 3\n3 0 1 9\n")
     assert len(scene.meshes[0].faces) == 2
-    assert "Left out 1 faces" in scene.warnings[0]
+    assert "Left out 1 face of" in scene.warnings[0]
 
 
 def test_texts_for_no_number_in_normals_are_made_anew() -> None:

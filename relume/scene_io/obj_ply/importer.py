@@ -21,7 +21,7 @@ from relume.scene.unique_names import unique_name
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.gltf.uvs import UvSlot
-from relume.scene_io.import_options import Recenter, choose_origin, moved_warning
+from relume.scene_io.import_options import Recenter
 from relume.scene_io.obj_ply.material_maker import MaterialMaker, emission_factor, read_companion, textured
 from relume.scene_io.obj_ply.mtl import read_library
 from relume.scene_io.obj_ply.mtl_dialects import MtlMap, MtlMaterial
@@ -29,7 +29,9 @@ from relume.scene_io.obj_ply.obj import Obj, as_rows, read_obj
 from relume.scene_io.obj_ply.ply import Ply, read_ply
 from relume.scene_io.obj_ply.polygons import Triangles, triangulate
 from relume.scene_io.obj_ply.stl import read_stl
+from relume.scene_io.obj_ply.text import counted
 from relume.scene_io.obj_ply.weld import Corners, make_mesh
+from relume.scene_io.placement import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
 
 F64 = NDArray[np.float64]
@@ -239,7 +241,7 @@ def _add_textured(builder: _Builder, ply: Ply, triangles: Triangles, corners: Co
     outside = (number < 0) | (number >= len(ply.textures))
     if outside.any():
         message = (
-            f"{int(outside.sum()):,} triangles of the .ply file have an image that it does not name; it is the first."
+            f"{counted(int(outside.sum()), 'triangle')} of the .ply file with an unnamed image: shown with the first."
         )
         builder.warnings.append(unsupported(message))
     number = np.where(outside, 0, number)

@@ -13,7 +13,7 @@ import numpy as np
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning
 from relume.scene_io.obj_ply.mtl_dialects import MtlMap, MtlMaterial, detect_dialect
-from relume.scene_io.obj_ply.text import Faults, decode_text, number, plain_lines, strip_comment
+from relume.scene_io.obj_ply.text import Faults, counted, decode_text, number, plain_lines, strip_comment
 
 MAX_LIBRARY_BYTES = 8 << 20
 MAX_MATERIALS = 1_000
@@ -69,7 +69,9 @@ def read_library(data: bytes, folder: str, warnings: list[ImporterWarning]) -> d
                 faults.add(f"line {line_number:,}", line)
         elif keyword.lower().startswith("map_") or keyword in (*USED_MAPS, *OTHER_MAPS):
             material.maps[keyword] = parse_map(strip_comment(arguments).split())
-    warnings.extend(faults.warnings(f"Left out {faults.count:,} values of the material file that cannot be used:"))
+    warnings.extend(
+        faults.warnings(f"Left out {counted(faults.count, 'value')} of the material file that cannot be used:")
+    )
     return materials
 
 

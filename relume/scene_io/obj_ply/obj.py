@@ -21,7 +21,15 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored
 from relume.scene.validate import MAX_TRIANGLES
 from relume.scene_io.obj_ply.polygons import OUT_OF_RANGE, Polygons
-from relume.scene_io.obj_ply.text import Faults, before_comment, decode_text, number, plain_lines, strip_comment
+from relume.scene_io.obj_ply.text import (
+    Faults,
+    before_comment,
+    counted,
+    decode_text,
+    number,
+    plain_lines,
+    strip_comment,
+)
 
 MAX_LINE_BYTES = 1 << 20
 MAX_GROUPS = 10_000
@@ -69,7 +77,7 @@ class Obj:
         colors = np.pad(colors, ((0, len(self.positions) // 3 - len(colors)), (0, 0)), constant_values=np.nan)
         is_missing = ~np.isfinite(colors).all(axis=1)
         if is_missing.any():
-            message = f"{int(is_missing.sum()):,} vertices of the .obj file have no color; they are white."
+            message = f"Vertices of the .obj file without a color are white: {int(is_missing.sum()):,}."
             warnings.append(approximated(message))
         colors[is_missing] = np.nan
         if np.nanmax(colors, initial=0.0) > BYTE_COLORS:
@@ -81,7 +89,9 @@ class Obj:
         """Warnings about lines that were left out."""
         kinds = sorted({IGNORED_KEYWORDS[keyword] for keyword in self.ignored_keywords})
         return [
-            *self.faults.warnings(f"Left out {self.faults.count:,} lines of the .obj file that cannot be read:"),
+            *self.faults.warnings(
+                f"Left out {counted(self.faults.count, 'line')} of the .obj file that cannot be read:"
+            ),
             *(ignored(f"The file's {kind} aren't supported; only faces are shown.") for kind in kinds),
         ]
 

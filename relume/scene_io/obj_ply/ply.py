@@ -29,7 +29,7 @@ from relume.scene_io.obj_ply.ply_rows import (
     whole_numbers,
 )
 from relume.scene_io.obj_ply.polygons import Polygons
-from relume.scene_io.obj_ply.text import decode_text
+from relume.scene_io.obj_ply.text import counted, decode_text
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -183,9 +183,7 @@ def _uvs(
     num_values, values = texcoord
     has_uvs = num_values == 2 * lengths
     if (num_wrong := int((~has_uvs & (num_values > 0)).sum())) > 0:
-        message = (
-            f"{num_wrong:,} faces of the .ply file have UV coordinates for other numbers of corners; they have none."
-        )
+        message = f"Left out UV coordinates of {counted(num_wrong, 'face')} of the .ply file: not two for each corner."
         warnings.append(unsupported(message))
     owner = np.repeat(np.arange(len(lengths)), lengths)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
@@ -222,7 +220,7 @@ def _colors(rows: Columns, elements: list[Element], name: str, warnings: list[Im
     colors = _columns(rows, names)
     is_missing = ~np.isfinite(colors).all(axis=1)
     if is_missing.any():
-        message = f"{int(is_missing.sum()):,} colors of the .ply file are not numbers; they are white."
+        message = f"Made {counted(int(is_missing.sum()), 'color')} of the .ply file white: not numbers."
         warnings.append(unsupported(message))
         colors[is_missing] = np.inf
     types = {p.name: p.type for element in elements if element.name == name for p in element.properties}

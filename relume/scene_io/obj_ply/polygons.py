@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.scene.validate import MAX_TRIANGLES
+from relume.scene_io.obj_ply.text import counted
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -89,13 +90,13 @@ def _check_indices(
 ) -> tuple[I64, Bools]:
     """Corners with UVs and normals that exist, -1 otherwise; and whether all positions of each polygon exist."""
     corners = polygons.corners.copy()
-    for k, (count, effect) in enumerate(zip(counts, ("UV coordinates", "normals"), strict=True), start=1):
+    sentences = (("No UV coordinates for", unsupported), ("Computed the normals of", approximated))
+    for k, (count, (sentence, make_warning)) in enumerate(zip(counts, sentences, strict=True), start=1):
         is_missing = (corners[:, k] < -1) | (corners[:, k] >= count)
         corners[is_missing, k] = -1
         if is_missing.any():
-            num = f"{int(is_missing.sum()):,} corners of the {kind} file refer to {effect} that it does not have"
-            remedy = "the textures there are wrong" if k == 1 else "they were computed"
-            warnings.append((unsupported if k == 1 else approximated)(f"{num}; {remedy}."))
+            corners_text = f"{counted(int(is_missing.sum()), 'corner')} of the {kind} file"
+            warnings.append(make_warning(f"{sentence} {corners_text}: their indices are out of range."))
     vertex = corners[:, 0]
     is_inside = (vertex >= 0) & (vertex < len(positions))
     is_number = (np.abs(positions) < MAX_POSITION).all(axis=1)  # false for NaN
@@ -103,8 +104,8 @@ def _check_indices(
     owner = np.repeat(np.arange(len(polygons.lengths)), polygons.lengths)
     is_usable = np.bincount(owner[~is_inside], minlength=len(polygons.lengths)) == 0
     if not is_usable.all():
-        num = f"{int((~is_usable).sum()):,} faces of the {kind} file"
-        warnings.append(unsupported(f"Left out {num}: they refer to vertices that do not exist or are not numbers."))
+        num = f"{counted(int((~is_usable).sum()), 'face')} of the {kind} file"
+        warnings.append(unsupported(f"Left out {num}: vertices do not exist or are not numbers."))
     return corners, is_usable
 
 
@@ -135,12 +136,10 @@ def _clip_concave(
             has_triangle[rows] = np.arange(count - 2) < len(triangles)
             source[rows][: len(triangles)] = start + triangles
     if num_crossing:
-        message = f"{num_crossing:,} faces of the {kind} file cross themselves; their triangles are a guess."
+        message = f"Guessed the triangles of {counted(num_crossing, 'face')} of the {kind} file: edges cross."
         warnings.append(approximated(message))
     if num_large:
-        message = (
-            f"{num_large:,} concave faces of the {kind} file have too many corners to be cut; they are filled as fans"
-        )
+        message = f"Filled {counted(num_large, 'concave face')} of the {kind} file as fans: too many corners to cut"
         warnings.append(unsupported(f"{message}. Triangulate them in the program that wrote the file."))
     return has_triangle
 

@@ -18,7 +18,7 @@ from relume.core.color import srgb_decode
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene.validate import MAX_TRIANGLES
-from relume.scene_io.obj_ply.text import Faults, decode_text, number, plain_lines
+from relume.scene_io.obj_ply.text import Faults, counted, decode_text, number, plain_lines
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -96,7 +96,7 @@ def _read_binary(data: bytes, warnings: list[ImporterWarning]) -> Stl:
     is_usable = np.isfinite(corners).all(axis=(1, 2))
     if not is_usable.all():
         num = int((~is_usable).sum())
-        warnings.append(unsupported(f"Left out {num:,} faces of the .stl file: their vertices are not numbers."))
+        warnings.append(unsupported(f"Left out {counted(num, 'face')} of the .stl file: vertices are not numbers."))
     colors = facet_colors(data[:80], facets["attribute"])
     return _merge_corners(
         corners[is_usable], None if colors is None else colors[is_usable], (("", int(is_usable.sum())),)
@@ -154,13 +154,13 @@ def _read_text(data: bytes, warnings: list[ImporterWarning]) -> Stl:
     if num_corners or is_open:
         warnings.append(unsupported("The .stl file ends early: it has no endsolid."))
         del values[len(values) - 3 * num_corners :]
-    warnings.extend(faults.warnings(f"Left out {faults.count:,} triangles of the .stl file that are incomplete:"))
+    warnings.extend(faults.warnings(f"Left out {counted(faults.count, 'incomplete triangle')} of the .stl file:"))
     corners = np.array(values, np.float64).reshape(-1, 3, 3)
     owner = np.repeat(np.arange(len(solids)), [int(count) for _, count in solids])
     is_usable = np.isfinite(corners).all(axis=(1, 2))
     if not is_usable.all():
         num = int((~is_usable).sum())
-        warnings.append(unsupported(f"Left out {num:,} faces of the .stl file: their vertices are not numbers."))
+        warnings.append(unsupported(f"Left out {counted(num, 'face')} of the .stl file: vertices are not numbers."))
     counts = np.bincount(owner[is_usable], minlength=len(solids))
     named = tuple((str(name), int(count)) for (name, _), count in zip(solids, counts, strict=True))
     return _merge_corners(corners[is_usable], None, named)

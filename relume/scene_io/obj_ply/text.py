@@ -49,6 +49,11 @@ def strip_comment(text: str) -> str:
     return re.split(r"(?:^|\s)#(?:\s|$)", text, maxsplit=1)[0].strip()
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: "1 face", "2 faces"."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
 class Faults:
     """Faults of one kind in a file, for one warning."""
 

@@ -12,6 +12,7 @@ from relume.core.import_warnings import ImporterWarning, approximated, unsupport
 from relume.scene.model import F32, Material, Mesh
 from relume.scene_io.gltf.geometry import MAX_COORDINATE, find_nondegenerate, is_usable
 from relume.scene_io.gltf.uvs import compute_tangents
+from relume.scene_io.obj_ply.text import counted
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -82,7 +83,7 @@ def _uvs(corners: Corners, triangles: I64, label: str, warnings: list[ImporterWa
     """UV coordinates of the corners; zero if a corner has none. (num_corners, 2)"""
     uvs, num_wrong = _gather_values(corners.uvs, triangles[..., 1], 2)
     if num_wrong:
-        message = f"{num_wrong:,} UV coordinates of {label} are NaN, infinite or huge; they were set to zero."
+        message = f"Set {counted(num_wrong, 'UV coordinate')} of {label} to zero: NaN, infinite or huge."
         warnings.append(unsupported(message))
     return uvs.astype(np.float32)
 
@@ -93,11 +94,11 @@ def _normals(corners: Corners, triangles: I64, points: F32, label: str, warnings
     length = np.linalg.norm(file_normals, axis=1, keepdims=True)
     is_given = length > MIN_NORMAL
     if num_wrong:
-        message = f"{num_wrong:,} normals of {label} are NaN, infinite or huge; they were computed."
+        message = f"Computed {counted(num_wrong, 'normal')} of {label}: NaN, infinite or huge in the file."
         warnings.append(approximated(message))
     num_zero = int((~is_given[triangles[..., 2].reshape(-1) >= 0]).sum()) - num_wrong
     if num_zero:
-        warnings.append(approximated(f"{num_zero:,} normals of {label} have no length; they were computed."))
+        warnings.append(approximated(f"Computed {counted(num_zero, 'normal')} of {label}: without length in the file."))
     if is_given.all():
         return np.asarray(file_normals / length, np.float32)
     creased = creased_normals(points.astype(np.float64), triangles[..., 0])

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from relume.core.import_warnings import Severity
-from relume.scene_io.import_options import ImportOptions
 from relume.look.document import MAX_BOUNCES
 from relume.look.model import PathFilter
+from relume.scene_io.import_options import ImportOptions
 from relume_server.schemas.base import Body, Id, Name
 from relume_server.schemas.cameras import CameraBody, CameraFrame
 from relume_server.schemas.comments import MAX_PICTURE_TEXT
