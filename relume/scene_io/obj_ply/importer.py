@@ -137,7 +137,7 @@ def import_obj(
         ends = np.cumsum([len(block) for block in blocks])
         for object_name, block in zip(objects, np.split(corners.triangles, ends[:-1]), strict=True):
             builder.add_mesh(replace(corners, triangles=block), object_name or material_name or "mesh")
-    _warn_missing_materials(obj, library, warnings)
+    _warn_missing_materials(obj, library, "gray" if colors is None else "colored by its vertices", warnings)
     return builder.scene(name, environment, origin)
 
 
@@ -176,7 +176,9 @@ def _add_obj_material(
         builder.warnings.append(unsupported(message))
     slot = builder.add_material(name, mtl_material)
     return (
-        corners if slot == UvSlot() else replace(corners, uvs=slot.apply([corners.uvs], len(corners.uvs)).astype(float))
+        corners
+        if slot == UvSlot()
+        else replace(corners, uvs=slot.apply([corners.uvs.astype(np.float32)], len(corners.uvs)).astype(float))
     )
 
 
@@ -185,15 +187,19 @@ def _find(library: dict[str, MtlMaterial], name: str) -> MtlMaterial | None:
     return library.get(name) or library.get(name.split(" #")[0].strip())
 
 
-def _warn_missing_materials(obj: Obj, library: dict[str, MtlMaterial], warnings: list[ImporterWarning]) -> None:
+def _warn_missing_materials(
+    obj: Obj, library: dict[str, MtlMaterial], look: str, warnings: list[ImporterWarning]
+) -> None:
+    """One warning for all materials without a library, or one for each that the library lacks; `look` is theirs."""
     names = [material for _, material in obj.groups if material and _find(library, material) is None]
     names = list(dict.fromkeys(names))
     if names and not obj.libraries:
         listed = ", ".join(map(quote, names[:3])) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-        warnings.append(unsupported(f"The file names no material file, so materials are gray: {listed}."))
+        warnings.append(unsupported(f"The file names no material file; each material is {look}: {listed}."))
     elif names:
         warnings.extend(
-            unsupported(f"Material {quote(material)} is missing from the .mtl file; it is gray.") for material in names
+            unsupported(f"Material {quote(material)} is missing from the .mtl file; it is {look}.")
+            for material in names
         )
 
 

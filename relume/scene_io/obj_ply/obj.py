@@ -75,7 +75,7 @@ class Obj:
         if len(colors) == 0:
             return None
         colors = np.pad(colors, ((0, len(self.positions) // 3 - len(colors)), (0, 0)), constant_values=np.nan)
-        is_missing = ~np.isfinite(colors).all(axis=1)
+        is_missing = np.asarray(~np.isfinite(colors).all(axis=1))
         if is_missing.any():
             message = f"Vertices of the .obj file without a color are white: {int(is_missing.sum()):,}."
             warnings.append(approximated(message))

@@ -203,7 +203,11 @@ def _length(value: float) -> int:
 
 def whole_numbers(values: NDArray[Any]) -> NDArray[np.int64]:
     """Indices; a value that is no integer or too large becomes -2, which is always out of range."""
-    is_whole = np.abs(values) < 2**40 if values.dtype.kind == "f" else np.ones(values.shape, np.bool_)
+    is_whole = (
+        (np.abs(values) < 2**40) & (values == np.rint(values))
+        if values.dtype.kind == "f"
+        else np.ones(values.shape, np.bool_)
+    )
     return np.where(is_whole, values, -2).astype(np.int64)
 
 

@@ -99,7 +99,7 @@ def _check_indices(
             warnings.append(make_warning(f"{sentence} {corners_text}: their indices are out of range."))
     vertex = corners[:, 0]
     is_inside = (vertex >= 0) & (vertex < len(positions))
-    is_number = (np.abs(positions) < MAX_POSITION).all(axis=1)  # false for NaN
+    is_number = np.asarray((np.abs(positions) < MAX_POSITION).all(axis=1))  # false for NaN
     is_inside[is_inside] = is_number[vertex[is_inside]]
     owner = np.repeat(np.arange(len(polygons.lengths)), polygons.lengths)
     is_usable = np.bincount(owner[~is_inside], minlength=len(polygons.lengths)) == 0

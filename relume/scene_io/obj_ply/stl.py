@@ -129,7 +129,8 @@ def facet_colors(
 
 
 def _read_text(data: bytes, warnings: list[ImporterWarning]) -> Stl:
-    values, solids = array("d"), [["", 0]]
+    values = array("d")
+    names, counts = [""], [0]
     faults, num_corners, is_open = Faults(), 0, False
     for token in TEXT_TOKEN.finditer(plain_lines(data)):
         if token[1] is not None:
@@ -139,16 +140,17 @@ def _read_text(data: bytes, warnings: list[ImporterWarning]) -> Stl:
             complete = num_corners == 3
             if not complete:
                 del values[len(values) - 3 * num_corners :]
-                faults.add(f"triangle {int(solids[-1][1]) + 1:,}", f"{num_corners} vertices")
-            solids[-1][1] = int(solids[-1][1]) + complete
+                faults.add(f"triangle {sum(counts) + 1:,}", f"{num_corners} vertices")
+            counts[-1] += complete
             num_corners = 0
             if len(values) > 9 * MAX_TRIANGLES:
                 raise SceneError(f"the .stl file has more than {MAX_TRIANGLES:,} triangles; simplify it")
         elif token[5] is not None:
             is_open = True
-            if solids[-1][1] and len(solids) < MAX_SOLIDS:
-                solids.append(["", 0])
-            solids[-1][0] = solids[-1][0] or decode_text(token[5]).strip()[:200]
+            if counts[-1] and len(names) < MAX_SOLIDS:
+                names.append("")
+                counts.append(0)
+            names[-1] = names[-1] or decode_text(token[5]).strip()[:200]
         elif token[6] is not None:
             is_open = False
     if num_corners or is_open:
@@ -156,13 +158,13 @@ def _read_text(data: bytes, warnings: list[ImporterWarning]) -> Stl:
         del values[len(values) - 3 * num_corners :]
     warnings.extend(faults.warnings(f"Left out {counted(faults.count, 'incomplete triangle')} of the .stl file:"))
     corners = np.array(values, np.float64).reshape(-1, 3, 3)
-    owner = np.repeat(np.arange(len(solids)), [int(count) for _, count in solids])
+    owner = np.repeat(np.arange(len(names)), counts)
     is_usable = np.isfinite(corners).all(axis=(1, 2))
     if not is_usable.all():
         num = int((~is_usable).sum())
         warnings.append(unsupported(f"Left out {counted(num, 'face')} of the .stl file: vertices are not numbers."))
-    counts = np.bincount(owner[is_usable], minlength=len(solids))
-    named = tuple((str(name), int(count)) for (name, _), count in zip(solids, counts, strict=True))
+    num_usable = np.bincount(owner[is_usable], minlength=len(names)).tolist()
+    named = tuple(zip(names, num_usable, strict=True))
     return _merge_corners(corners[is_usable], None, named)
 
 
