@@ -27,7 +27,7 @@ from relume.scene_io.obj_ply.mtl import read_library
 from relume.scene_io.obj_ply.mtl_dialects import MtlMap, MtlMaterial
 from relume.scene_io.obj_ply.obj import Obj, as_rows, read_obj
 from relume.scene_io.obj_ply.ply import Ply, read_ply
-from relume.scene_io.obj_ply.polygons import Triangles, triangulate
+from relume.scene_io.obj_ply.polygons import CutPolygons, triangulate
 from relume.scene_io.obj_ply.stl import read_stl
 from relume.scene_io.obj_ply.text import counted
 from relume.scene_io.obj_ply.weld import Corners, make_mesh
@@ -141,7 +141,7 @@ def import_obj(
     return builder.scene(name, environment, origin)
 
 
-def _by_material(obj: Obj, triangles: Triangles) -> dict[str, dict[str, I64]]:
+def _by_material(obj: Obj, triangles: CutPolygons) -> dict[str, dict[str, I64]]:
     """Indices of the triangles of each object, by material."""
     group = np.array(obj.group, np.int64)[triangles.polygon]
     order = np.argsort(group, kind="stable")
@@ -155,7 +155,7 @@ def _by_material(obj: Obj, triangles: Triangles) -> dict[str, dict[str, I64]]:
 
 def _shape(
     obj: Obj, num_uvs: int, num_normals: int, recenter: Recenter, warnings: list[ImporterWarning]
-) -> tuple[F64, Triangles, F64]:
+) -> tuple[F64, CutPolygons, F64]:
     """Positions relative to the origin, triangles, and the origin."""
     positions = as_rows(obj.positions, 3)
     triangles, faults = triangulate(obj.polygons(), positions, num_uvs, num_normals, ".obj")
@@ -238,7 +238,7 @@ def import_ply(
     return builder.scene(name, environment, origin)
 
 
-def _add_textured(builder: _Builder, ply: Ply, triangles: Triangles, corners: Corners) -> None:
+def _add_textured(builder: _Builder, ply: Ply, triangles: CutPolygons, corners: Corners) -> None:
     """A material and a mesh for each image of the file."""
     colors = _corner_colors(ply, triangles)
     if colors is not None and colors.size and colors.min() < 0.99:
@@ -260,7 +260,7 @@ def _add_textured(builder: _Builder, ply: Ply, triangles: Triangles, corners: Co
             builder.add_mesh(replace(corners, triangles=corners.triangles[rows]), stem or "mesh")
 
 
-def _corner_colors(ply: Ply, triangles: Triangles) -> Shaped[F32, "triangles 3 3"] | None:
+def _corner_colors(ply: Ply, triangles: CutPolygons) -> Shaped[F32, "triangles 3 3"] | None:
     """Linear colors of the corners, from vertices or else from faces."""
     if ply.colors is not None:
         return ply.colors[triangles.corners[..., 0]]

@@ -42,7 +42,7 @@ class Polygons:
 
 
 @dataclass(frozen=True)
-class Triangles:
+class CutPolygons:
     """Triangles of polygons.
 
     Attributes:
@@ -57,7 +57,7 @@ class Triangles:
 
 def triangulate(
     polygons: Polygons, positions: Shaped[F64, "positions 3"], num_uvs: int, num_normals: int, kind: str
-) -> tuple[Triangles, list[ImporterWarning]]:
+) -> tuple[CutPolygons, list[ImporterWarning]]:
     """Make triangles, in the order of the polygons; also return a warning for each kind of fault.
 
     Args:
@@ -82,7 +82,7 @@ def triangulate(
         source, num_triangles, corners[:, 0], first, polygons.lengths, positions, kind, warnings
     )
     source, polygon = source[has_triangle], polygon[has_triangle]
-    return Triangles(corners[source], polygon, source), warnings
+    return CutPolygons(corners[source], polygon, source), warnings
 
 
 def _check_indices(

@@ -61,11 +61,11 @@ class Faults:
         self.count = 0
         self._examples: list[str] = []
 
-    def add(self, place: str, content: str) -> None:
-        """Add a fault: where it is, and its text in the file."""
+    def add(self, location: str, content: str) -> None:
+        """Add a fault: its location, and its text in the file."""
         self.count += 1
         if len(self._examples) < MAX_EXAMPLES:
-            self._examples.append(f"{place} (“{UNREADABLE.sub('', content.strip()[:40])}”)")
+            self._examples.append(f"{location} (“{UNREADABLE.sub('', content.strip()[:40])}”)")
 
     def warnings(self, sentence: str) -> list[ImporterWarning]:
         """One warning with the first faults, or none: `sentence` ends before them."""
