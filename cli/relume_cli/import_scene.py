@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -74,7 +74,7 @@ def import_scene(
         typer.echo(f"warning, {warning.severity}: {warning}", err=True)
 
 
-def _options(ledger: Ledger, name: str, given: dict[str, str]) -> ImportOptions:
+def _options(ledger: Ledger, name: str, given: Mapping[str, str]) -> ImportOptions:
     """The options given, over those of the newest scene with that name."""
     from relume.scene_io.import_options import ImportOptions
     from relume_worker.scenes import last_import_options
