@@ -104,6 +104,8 @@ def _decode_other(data: bytes, suffix: str, label: str, check_size: Callable[[in
 
 def _read_bytes(image: oiio.ImageInput, data: bytes, label: str, check_size: Callable[[int, int], None]) -> U8:
     spec = image.spec()
+    if min(spec.width, spec.height) < 1:
+        raise SceneError(f"{label} is damaged, or its format is not supported; save it as PNG")
     check_size(spec.width, spec.height)
     if spec.depth != 1 or not 1 <= spec.nchannels <= 4 or str(spec.format) in ("half", "float", "double"):
         raise SceneError(f"{label} has {spec.nchannels} channels of {spec.format}; save it as PNG")
