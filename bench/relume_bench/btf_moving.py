@@ -1,8 +1,8 @@
 """btf.moving_rmse: BTFs as a moving camera shows them, against the geometry itself.
 
 A plane covered with the weave, the pebbles and the corduroy, under the studio and under an environment with a
-sun, from four cameras between the directions of the BTFs. Compared are moving frames, with hard shadows and without refinement,
-with Mitsuba's paths through the small geometry. The noise is removed.
+sun, from four cameras between the directions of the BTFs. Compared are moving frames, with hard shadows and without
+refinement, with Mitsuba's paths through the small geometry. The noise is removed.
 """
 
 from __future__ import annotations

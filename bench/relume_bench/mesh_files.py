@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.scene_io.obj_ply.obj import read_obj
+from relume.scene_io.obj_ply.obj import as_rows, read_obj
 from relume.scene_io.obj_ply.ply import read_ply
+from relume.scene_io.obj_ply.polygons import triangulate
 from relume_bench.figure import Figure
 from relume_bench.timing import time_interleaved
 
@@ -29,9 +30,22 @@ def measure(tiny: bool) -> list[Figure]:
     positions, faces = _grid(8 if tiny else 707)
     obj, ply = _obj_text(positions, faces), _ply_bytes(positions, faces)
     return [
-        _figure("import.obj", len(faces), obj, lambda: read_obj(obj).corners(), "tinyobjloader", _by_tinyobjloader),
-        _figure("import.ply", len(faces), ply, lambda: read_ply(ply), "plyfile", _by_plyfile),
+        _figure("import.obj", len(faces), obj, lambda: _read_obj(obj), "tinyobjloader", _by_tinyobjloader),
+        _figure("import.ply", len(faces), ply, lambda: _read_ply(ply), "plyfile", _by_plyfile),
     ]
+
+
+def _read_obj(data: bytes) -> object:
+    """The triangles of an OBJ file."""
+    obj = read_obj(data)
+    counts = len(obj.uvs) // 2, len(obj.normals) // 3
+    return triangulate(obj.polygons(), as_rows(obj.positions, 3), *counts, ".obj")
+
+
+def _read_ply(data: bytes) -> object:
+    """The triangles of a PLY file."""
+    ply = read_ply(data, [])
+    return triangulate(ply.polygons, ply.positions, len(ply.uvs), len(ply.normals), ".ply")
 
 
 def _figure(

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from relume.core.import_warnings import SEVERITIES
+from relume.scene_io.import_options import Recenter, Unit, UpAxis
 from relume_cli.options import Data, check_readable
-from relume_cli.terminal.printing import Json, print_result
+from relume_cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
     from relume.scene.model import Material, Scene
+    from relume.scene_io.import_options import ImportOptions
+    from relume_worker.ledger import Ledger
 
 
 def import_scene(
     file: Annotated[
         Path | None,
         typer.Argument(
-            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply or .zip, with the files it references."
+            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply, .stl or .zip, with the files it references."
         ),
     ] = None,
     environment: Annotated[
@@ -31,30 +34,93 @@ def import_scene(
         str | None, typer.Option(metavar="NAME", help="Built-in scene instead of a file; see relume list built-ins.")
     ] = None,
     ground: Annotated[bool, typer.Option("--ground", help="Add a ground plane that catches shadows.")] = False,
+    up: Annotated[
+        UpAxis | None, typer.Option(help="Axis of the file that points up. [default: as the file says]")
+    ] = None,
+    unit: Annotated[
+        Unit | None, typer.Option(help="Unit of the file; auto guesses it from the size. [default: as the file says]")
+    ] = None,
+    recenter: Annotated[
+        Recenter | None,
+        typer.Option(help="Make positions relative to the middle; auto does so far from zero. [default: auto]"),
+    ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Import a scene; print its id.
 
     Prints a warning for each feature that was not read: "unsupported" is missing or differs from the file,
-    "approximated" looks much the same, "ignored" does not change the image.
+    "approximated" looks much the same, "ignored" does not change the image. --up, --unit and --recenter are remembered:
+    the next import of a scene with this name has them unless others are given.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.terminal.documents import scene_document
     from relume_worker.scenes import get_scene, register_scene
 
-    scene = _read_scene(file, environment, name, built_in)
-    scene = with_ground(scene) if ground else scene
+    given = {key: value for key, value in (("up", up), ("unit", unit), ("recenter", recenter)) if value is not None}
     service = open_bakes(open_settings(data))
     try:
+        options = None if built_in or file is None else _options(service.ledger, name or file.stem, given)
+        scene = _read_scene(file, environment, name, built_in, options)
+        scene = with_ground(scene) if ground else scene
         record = get_scene(service.ledger, register_scene(service.data_dir, service.ledger, scene))
         bakes = service.bakes(record.id)
     finally:
         service.close()
-    print_result(scene_document(record, bakes), record.id, as_json=as_json, details=_summary_lines(scene))
+    document = scene_document(record, bakes) | _content_document(scene)
+    print_result(document, record.id, as_json=as_json, details=_summary_lines(scene))
     for warning in sorted(record.warnings, key=lambda warning: SEVERITIES.index(warning.severity)):
         typer.echo(f"warning, {warning.severity}: {warning}", err=True)
+
+
+def _options(ledger: Ledger, name: str, given: Mapping[str, str]) -> ImportOptions:
+    """The options given, over those of the newest scene with that name."""
+    from relume.scene_io.import_options import ImportOptions
+    from relume_worker.scenes import last_import_options
+
+    remembered = {key: value for key, value in last_import_options(ledger, name).items() if key not in given}
+    if remembered:
+        options = " ".join(f"--{key} {value}" for key, value in remembered.items())
+        note(f"as in the last import of {name}: {options}")
+    return ImportOptions.model_validate({**remembered, **given})
+
+
+def _content_document(scene: Scene) -> dict[str, Any]:
+    """Content of an imported scene as JSON: its size in meters and m², materials with their textures, and cameras."""
+    from relume.scene_io.placement import area, bounds
+
+    low, high = bounds(scene)
+    return {
+        "bounds": [low.tolist(), high.tolist()],
+        "area": area(scene),
+        "offset": list(scene.offset),
+        "import_options": scene.import_options,
+        "materials": [
+            {"name": material.name, "terms": list(material.terms), "textures": _texture_documents(material)}
+            for material in scene.materials
+        ],
+        "lights": [{"name": light.name, **light.fields} for light in scene.lights],
+        "cameras": [
+            {"name": camera.name, "to_world": camera.to_world.tolist(), "yfov": camera.yfov, "aspect": camera.aspect}
+            for camera in scene.cameras
+        ],
+    }
+
+
+def _texture_documents(material: Material) -> dict[str, Any]:
+    """Width, height and wrap modes of each texture of a material, by slot."""
+    textures = dict(material.textures)
+    if material.normal_map is not None:
+        textures["normal_map"] = material.normal_map
+    documents = {
+        slot: {"size": [texture.pixels.shape[1], texture.pixels.shape[0]], "wrap": list(texture.wrap)}
+        for slot, texture in textures.items()
+    }
+    if material.opacity is not None:
+        height, width = material.opacity.alpha.shape
+        documents["opacity"] = {"size": [width, height], "wrap": list(material.opacity.wrap)}
+    return documents
 
 
 def _summary_lines(scene: Scene) -> Iterator[str]:
@@ -89,7 +155,13 @@ def _describe_material(material: Material) -> Iterator[str]:
         yield "glass"
 
 
-def _read_scene(file: Path | None, environment: Path | None, name: str | None, built_in_name: str | None) -> Scene:
+def _read_scene(
+    file: Path | None,
+    environment: Path | None,
+    name: str | None,
+    built_in_name: str | None,
+    options: ImportOptions | None,
+) -> Scene:
     from relume.assets.environments.read_environment import read_environment
     from relume.core.errors import ParameterError, PlanError
     from relume.scene.examples.catalog import BUILT_IN, built_in
@@ -105,4 +177,4 @@ def _read_scene(file: Path | None, environment: Path | None, name: str | None, b
     if environment is not None:
         check_readable("--environment", environment)
     light = None if environment is None else read_environment(environment, environment.stem)
-    return read_scene(check_readable("FILE", file), name or file.stem, light)
+    return read_scene(check_readable("FILE", file), name or file.stem, light, options=options)

@@ -611,6 +611,13 @@ export interface ImageBody {
   thumbnail: string;
 }
 
+/** Properties of a scene that its file does not say. Attributes: up: the file's axis that points up. "file": as the file says, +Y if it does not. unit: the file's unit. "file": as the file says, meters if it does not. "auto": a guess from the size. recenter: whether positions are relative to the middle of the scene. "auto": if it is more than a hundred times its size from the origin, where single precision would round the shape. */
+export interface ImportOptions {
+  up: "file" | "y" | "z" | "-z";
+  unit: "file" | "m" | "cm" | "mm" | "in" | "ft" | "auto";
+  recenter: "auto" | "always" | "never";
+}
+
 /** server → client: one pixel; `bands` is the contribution of each band of the active curve, per channel. `position` and `normal`: of the surface that covers most of the pixel, world space; null for background. */
 export interface InspectAnswer {
   type: "inspect";
@@ -873,7 +880,7 @@ export interface RoomUpdate {
   edited_by: number[];
 }
 
-/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. */
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. `import_options`: for the next import of its file. */
 export interface SceneBody {
   id: string;
   name: string;
@@ -883,6 +890,7 @@ export interface SceneBody {
   lights: string[];
   variants: SceneVariant[];
   warnings: SceneWarning[];
+  import_options: ImportOptions;
   triangles: number;
   thumbnail: string | null;
   bakes: string[];
@@ -925,10 +933,11 @@ export interface SceneView {
   is_placed: boolean;
 }
 
-/** An import warning. `severity`: the feature is missing or wrong in the image ("unsupported"), looks much the same ("approximated"), or does not change the image ("ignored"). */
+/** An import warning. `severity`: the feature is missing or wrong in the image ("unsupported"), looks much the same ("approximated"), or does not change the image ("ignored"). `where`: the part of the file, empty for all of it. */
 export interface SceneWarning {
   text: string;
   severity: "unsupported" | "approximated" | "ignored";
+  where: string;
 }
 
 /** Content of a share link; `missing`: one sentence for each deleted part of it. */

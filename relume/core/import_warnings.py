@@ -8,6 +8,17 @@ from typing import Any, Literal, get_args
 Severity = Literal["unsupported", "approximated", "ignored"]
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
+LOCATIONS = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"(?:mesh|material|light|node|camera|primitive) “[^”]*”",
+        r"(?:image|texture) “[^”]*”",
+        r"line [\d,]+",
+        r"“[^”]+\.\w{2,5}”",
+        r"the (?:\.\w+|material) file|the mesh",
+    )
+)
+"""The part of a file that a sentence is about, the most telling first."""
 UNREADABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
@@ -34,9 +45,14 @@ class ImporterWarning(str):
     def __getnewargs__(self) -> tuple[Any, ...]:
         return str(self), self.severity
 
+    @property
+    def location(self) -> str:
+        """The part of the file that the sentence names, such as a material; empty if none."""
+        return next((match[0] for pattern in LOCATIONS if (match := pattern.search(self))), "")
+
     def document(self) -> dict[str, str]:
         """Convert to JSON."""
-        return {"text": str(self), "severity": self.severity}
+        return {"text": str(self), "severity": self.severity, "where": self.location}
 
 
 def unsupported(sentence: str) -> ImporterWarning:

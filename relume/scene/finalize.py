@@ -22,6 +22,7 @@ def finalize(
     warnings: Sequence[ImporterWarning],
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Scene:
     """Make the scene of an imported file; the most severe warnings come first, at most `MAX_WARNINGS`.
 
@@ -32,12 +33,19 @@ def finalize(
         warnings: warnings of the importer, one sentence each.
         variants: partial looks by name.
         lights: local lights with unique names.
+        offset: what was subtracted from the file's positions, meters.
     Raises:
         SceneError: the arguments are not a valid scene (see `relume.scene.validate`).
     """
-    all_warnings = [*environment.warnings, *warnings]
-    sorted_warnings = sorted(all_warnings, key=lambda warning: SEVERITIES.index(warning.severity))[:MAX_WARNINGS]
-    if len(all_warnings) > len(sorted_warnings):
-        num_omitted = len(all_warnings) - len(sorted_warnings)
-        sorted_warnings.append(ImporterWarning(f"… and {num_omitted:,} more.", sorted_warnings[-1].severity))
-    return make_scene(name, meshes, materials, cameras, environment, sorted_warnings, variants, lights)
+    all_warnings = sort_warnings([*environment.warnings, *warnings])
+    return make_scene(name, meshes, materials, cameras, environment, all_warnings, variants, lights, offset)
+
+
+def sort_warnings(warnings: Sequence[ImporterWarning]) -> list[ImporterWarning]:
+    """Return at most `MAX_WARNINGS`, the most severe first, and one about the rest."""
+    sorted_warnings = sorted(warnings, key=lambda warning: SEVERITIES.index(warning.severity))
+    if len(sorted_warnings) > MAX_WARNINGS:
+        num_omitted = len(sorted_warnings) - MAX_WARNINGS
+        more = ImporterWarning(f"… and {num_omitted:,} more.", sorted_warnings[MAX_WARNINGS - 1].severity)
+        return [*sorted_warnings[:MAX_WARNINGS], more]
+    return sorted_warnings

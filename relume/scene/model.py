@@ -177,6 +177,8 @@ class Scene:
         id: hash of the content, hexadecimal.
         warnings: warnings of the importer, one sentence each.
         variants: partial looks by name, from the file.
+        offset: what was subtracted from the positions of the file, meters with +Y up; zeros unless it was recentered.
+        import_options: `relume.scene_io.import_options.ImportOptions` other than the defaults; not part of the id.
     """
 
     id: str
@@ -188,3 +190,5 @@ class Scene:
     warnings: tuple[ImporterWarning, ...] = ()
     variants: dict[str, dict[str, Any]] = field(default_factory=dict)
     lights: tuple[Light, ...] = ()
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    import_options: dict[str, str] = field(default_factory=dict)

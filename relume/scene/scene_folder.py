@@ -27,6 +27,7 @@ MAX_JSON_BYTES = 64 << 20
 MAX_ARRAY_BYTES = 16 << 30
 MESH_ARRAYS = ("positions", "normals", "tangents", "uvs", "faces")
 REMEDY = "import the scene again"
+NOT_CONTENT = ("id", "warnings", "aspects", "import_options")  # of a document: scenes that differ in them are the same
 _STORED = (np.dtype("<f4"), np.dtype("<u4"), np.dtype("|u1"))
 
 Arrays = dict[str, NDArray[Any]]
@@ -41,6 +42,7 @@ def make_scene(
     warnings: Sequence[ImporterWarning] = (),
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Scene:
     """Validate the arguments and make a scene with its id.
 
@@ -51,12 +53,13 @@ def make_scene(
         warnings: warnings of the importer, one sentence each.
         variants: partial looks by name.
         lights: local lights with unique names.
+        offset: what was subtracted from the file's positions, meters.
     Raises:
         SceneError: the arguments are not a valid scene (see `relume.scene.validate`).
     """
     check_scene(meshes, materials, cameras, environment, lights)
     contents = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
-    scene = Scene("", name, *contents, tuple(lights))
+    scene = Scene("", name, *contents, tuple(lights), offset)
     document, arrays = _to_document(scene)
     return replace(scene, id=scene_id(document, arrays))
 
@@ -67,9 +70,9 @@ def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
 
 
 def scene_digest(document: dict[str, Any], arrays: Arrays) -> str:
-    """SHA-256 of all arrays and of the document without warnings and aspects, in hexadecimal digits."""
+    """SHA-256 of all arrays and of the document without `NOT_CONTENT`, in hexadecimal digits."""
     digest = hashlib.sha256()
-    content = {key: value for key, value in document.items() if key not in ("id", "warnings", "aspects")}
+    content = {key: value for key, value in document.items() if key not in NOT_CONTENT}
     digest.update(json.dumps(content, sort_keys=True, allow_nan=False).encode())
     for key in sorted(arrays):
         array = np.ascontiguousarray(arrays[key])
@@ -197,6 +200,10 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         document["variants"] = scene.variants
     if scene.lights:
         document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
+    if any(scene.offset):
+        document["offset"] = list(scene.offset)
+    if scene.import_options:
+        document["import_options"] = scene.import_options
     return document, arrays
 
 
@@ -226,7 +233,14 @@ def _from_document(document: dict[str, Any], arrays: Arrays) -> Scene:
         tuple(warning_of(warning) for warning in document["warnings"]),
         {str(name): dict(look) for name, look in document.get("variants", {}).items()},
         tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
+        _offset(document),
+        {str(key): str(value) for key, value in document.get("import_options", {}).items()},
     )
+
+
+def _offset(document: dict[str, Any]) -> tuple[float, float, float]:
+    x, y, z = map(float, document.get("offset", (0, 0, 0)))
+    return x, y, z
 
 
 def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Material:

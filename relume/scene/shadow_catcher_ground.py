@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +33,7 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
     ground_name = unique_name("Ground", {material.name: 1 for material in scene.materials})
     material = Material(ground_name, (_GRAY,), shadow_catcher=True)
     mesh = _disc(ground_name, *_ball(scene), material=len(scene.materials))
-    return make_scene(
+    grounded = make_scene(
         name or scene.name,
         (*scene.meshes, mesh),
         (*scene.materials, material),
@@ -40,7 +42,9 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
         scene.warnings,
         scene.variants,
         scene.lights,
+        scene.offset,
     )
+    return replace(grounded, import_options=scene.import_options)
 
 
 def _ball(scene: Scene) -> tuple[F64, float]:

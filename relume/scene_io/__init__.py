@@ -1,1 +1,1 @@
-"""Import of glTF, OBJ and PLY scenes; untrusted files are checked before memory is allocated."""
+"""Import of glTF, OBJ, PLY and STL scenes; untrusted files are checked before memory is allocated."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from pathlib import Path
 
@@ -9,12 +10,14 @@ from relume.assets.environments.environment import Environment
 from relume.core.errors import SceneError
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
-from relume.scene_io.obj_ply import import_obj, import_ply
+from relume.scene_io.import_options import ImportOptions, Recenter
+from relume.scene_io.obj_ply import import_obj, import_ply, import_stl, is_stl
+from relume.scene_io.placement import place
 from relume.scene_io.referenced_files import Companions, Folder, NoFiles
 from relume.scene_io.zip_scene import open_zip
 
 MAX_FILE_BYTES = 512 << 20
-OBJ_LINE = re.compile(rb"^(v|vn|vt|f|o|g|usemtl|mtllib)[ \t]", re.MULTILINE)
+OBJ_LINE = re.compile(rb"(?:^|\r|\xef\xbb\xbf)[ \t]*(v|vn|vt|f|o|g|usemtl|mtllib)[ \t]", re.MULTILINE)
 
 
 def import_scene(
@@ -22,14 +25,16 @@ def import_scene(
     name: str,
     environment: Environment | None = None,
     companions: Companions | None = None,
+    options: ImportOptions | None = None,
 ) -> Scene:
-    """Import .glb, .gltf, .obj, .ply, or a .zip with one of them and the files that it needs.
+    """Import .glb, .gltf, .obj, .ply, .stl, or a .zip with one of them and the files that it needs.
 
     Args:
         source: a path, whose folder may have further files; or the bytes of a file.
         name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: further files, if they are not in the folder or in the same archive.
+        options: what the file does not say; None for the defaults.
 
     Raises:
         SceneError: the file is unusable; the message says why and what to do.
@@ -41,13 +46,21 @@ def import_scene(
         companions = NoFiles() if isinstance(source, bytes) else Folder(Path(source).parent)
     if data.startswith(b"PK"):
         data, companions = open_zip(data)
-    if data.startswith(b"ply"):
-        return import_ply(data, name, environment)
+    options = options or ImportOptions()
+    return place(_read(data, name, environment, companions, options.recenter), options)
+
+
+def _read(data: bytes, name: str, environment: Environment | None, companions: Companions, recenter: Recenter) -> Scene:
+    """The scene in the axes and unit of the file."""
+    if data.removeprefix(codecs.BOM_UTF8).startswith(b"ply"):
+        return import_ply(data, name, environment, companions, recenter)
     if data.startswith(b"glTF") or data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
         return import_gltf(data, name, environment, companions)
     if b"\0" not in data[:4_096] and OBJ_LINE.search(data[: 1 << 20]):
-        return import_obj(data, name, environment, companions)
-    raise SceneError("the scene file is not .glb, .gltf, .obj, .ply or .zip; export it as .glb")
+        return import_obj(data, name, environment, companions, recenter)
+    if is_stl(data):
+        return import_stl(data, name, environment, recenter)
+    raise SceneError("the scene file is not .glb, .gltf, .obj, .ply, .stl or .zip; export it as .glb")
 
 
 def read_file(source: str | Path | bytes) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import posixpath
+import unicodedata
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -60,7 +61,7 @@ class Folder:
         for spelling in dict.fromkeys((unquote(name), name)):
             plain = relative_path(spelling, label)
             try:
-                path = (self._folder / plain).resolve()
+                path = _any_case(self._folder, plain).resolve()
                 if not path.is_relative_to(self._folder):
                     raise SceneError(f"{label} is a link that leaves the scene's folder; copy the file there")
                 if not path.is_file():
@@ -76,6 +77,24 @@ class Folder:
         return None
 
 
+def _any_case(folder: Path, name: str) -> Path:
+    """The path of a file; where none has that spelling, of one that differs in case or in Unicode's normal form."""
+    path = folder / name
+    if path.exists():
+        return path
+    path = folder
+    for component in name.split("/"):
+        exact = path / component
+        names = [] if exact.exists() or not path.is_dir() else [entry.name for entry in path.iterdir()]
+        path = path / next((name for name in sorted(names) if fold(name) == fold(component)), component)
+    return path
+
+
+def fold(name: str) -> str:
+    """A name without differences of case and of Unicode's normal forms."""
+    return unicodedata.normalize("NFC", name).casefold()
+
+
 class NamedFiles(Generic[Entry]):
     """Files by name, including folders, independent of paths on disk."""
 
@@ -84,14 +103,14 @@ class NamedFiles(Generic[Entry]):
         Args:
             entries: entries by name, passed to `read`. folder: folder of the scene file, within those names.
         """
-        self._entries = {posixpath.normpath(name.replace("\\", "/")).lower(): entry for name, entry in entries.items()}
+        self._entries = {fold(posixpath.normpath(name.replace("\\", "/"))): entry for name, entry in entries.items()}
         self._folder, self._read = folder, read
 
     def read(self, name: str, label: str) -> bytes | None:
         """Read a file as `Companions.read` does; names are case-insensitive."""
         for spelling in dict.fromkeys((unquote(name), name)):
             plain = posixpath.normpath(posixpath.join(self._folder, spelling.replace("\\", "/")))
-            entry = self._entries.get(relative_path(plain, label).lower())
+            entry = self._entries.get(fold(relative_path(plain, label)))
             if entry is not None:
                 return self._read(entry)
         return None

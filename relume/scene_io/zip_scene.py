@@ -12,7 +12,7 @@ from relume.scene_io.referenced_files import MAX_BYTES, Archive, read_entry
 
 MAX_ENTRIES = 1_000
 MAX_DIRECTORY_BYTES = 1 << 20
-SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
+SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
 
 
@@ -34,7 +34,9 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
     _check_entries(entries)
     scenes = [entry for entry in entries if entry.filename.lower().endswith(SCENE_SUFFIXES)]
     if len(scenes) != 1:
-        raise SceneError(f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj or .ply")
+        raise SceneError(
+            f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj, .ply or .stl"
+        )
     folder = posixpath.dirname(scenes[0].filename.replace("\\", "/"))
     return read_entry(archive, scenes[0]), Archive(archive, folder)
 

@@ -1,4 +1,4 @@
-"""Broken, absurd or malicious OBJ, MTL, PLY and ZIP files give one clear SceneError, and nothing hangs."""
+"""Broken or malicious OBJ, MTL, PLY, STL and ZIP files are imported with warnings or rejected, and nothing hangs."""
 
 from __future__ import annotations
 
@@ -60,11 +60,20 @@ def packed(entries: dict[str, bytes], kind: int = zipfile.ZIP_DEFLATED) -> bytes
         b"vt",
         b"v nan 0 0\nf 1 2 4",
         b"v 1e300 0 0\nf 1 2 4",
-        b"f " + b"1 " * 600_000,
     ],
 )
-def test_invalid_obj_lines_are_refused(line: bytes) -> None:
-    rejected(OBJ + line + b"\n")
+def test_invalid_obj_lines_are_left_out_with_one_warning(line: bytes) -> None:
+    plain = import_scene(OBJ, "test", LIGHT)
+    scene = import_scene(OBJ + line + b"\n", "test", LIGHT)
+    is_uv = b"2/7/1" in line  # a face whose UV coordinates are missing is shown
+    assert len(scene.meshes[0].faces) == len(plain.meshes[0].faces) + is_uv
+    (warning,) = set(scene.warnings) - set(plain.warnings)
+    assert warning.severity == "unsupported"
+    assert warning.isprintable()
+
+
+def test_a_line_that_is_too_long_is_refused() -> None:
+    assert "longer than" in rejected(OBJ + b"f " + b"1 " * 600_000 + b"\n")
 
 
 def test_obj_without_faces_or_with_too_many_objects_is_refused() -> None:
@@ -102,11 +111,18 @@ def test_no_name_leads_out_of_the_folder(name: str, tmp_path: Path) -> None:
     for content in (library, OBJ):
         path.write_bytes(content)
         (tmp_path / "in" / "m.mtl").write_bytes(image)
-        with pytest.raises(SceneError, match="outside the scene's folder"):
-            import_scene(path, "test", LIGHT)
-    assert "outside the scene's folder" in rejected(packed({"scene.obj": library}))
-    assert "outside the scene's folder" in rejected(packed({"scene.obj": OBJ, "m.mtl": image}))
-    assert "outside the scene's folder" in rejected(library)
+        assert_outside(import_scene(path, "test", LIGHT), name)
+    assert_outside(import_scene(packed({"scene.obj": library}), "test", LIGHT), name)
+    assert_outside(import_scene(packed({"scene.obj": OBJ, "m.mtl": image}), "test", LIGHT), name)
+    assert_outside(import_scene(library, "test", LIGHT), name)
+
+
+def assert_outside(scene: Scene, name: str) -> None:
+    """Nothing of the other folder was read, and a warning says so, or that the last part of the name was."""
+    (material,) = scene.materials
+    assert not material.textures
+    assert len(material.terms) == 2 or material.terms[0]["color"] != [0.5] * 3
+    assert any("outside the scene's folder" in warning or "next to the scene" in warning for warning in scene.warnings)
 
 
 def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
@@ -114,13 +130,18 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "m.mtl").symlink_to(tmp_path / "secret.mtl")
     (tmp_path / "in" / "scene.obj").write_bytes(OBJ)
-    with pytest.raises(SceneError, match="link"):
-        import_scene(tmp_path / "in" / "scene.obj", "test", LIGHT)
+    scene = import_scene(tmp_path / "in" / "scene.obj", "test", LIGHT)
+    assert any("link that leaves" in warning for warning in scene.warnings)
+    assert "Ks" not in str(scene.warnings)  # of the secret
 
 
 @pytest.mark.parametrize("line", [b"Kd nan 0 0", b"Kd 1 2", b"Ns -1", b"Ns many", b"Kd 1e300", b"Pr inf"])
-def test_invalid_material_numbers_are_refused(line: bytes) -> None:
-    assert "material file" in rejected(packed({"a.obj": OBJ, "m.mtl": MTL + line}))
+def test_invalid_material_numbers_are_left_out_with_one_warning(line: bytes) -> None:
+    plain = import_scene(packed({"a.obj": OBJ, "m.mtl": MTL}), "test", LIGHT)
+    scene = import_scene(packed({"a.obj": OBJ, "m.mtl": MTL + line}), "test", LIGHT)
+    assert scene.materials[0].terms == plain.materials[0].terms
+    (warning,) = set(scene.warnings) - set(plain.warnings)
+    assert "material file" in warning
 
 
 def test_too_many_material_files_are_refused() -> None:
@@ -133,7 +154,26 @@ def test_too_many_material_files_are_refused() -> None:
 def test_huge_images_are_refused_before_decoding() -> None:
     ihdr = b"IHDR" + struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0)
     png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + ihdr + bytes(4)
-    rejected(packed({"a.obj": OBJ, "m.mtl": MTL, "wood.png": png}))
+    scene = import_scene(packed({"a.obj": OBJ, "m.mtl": MTL, "wood.png": png}), "test", LIGHT)
+    assert not scene.materials[0].textures
+    assert any("Skipped “wood.png”" in warning for warning in scene.warnings)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\0\0\2" + bytes(9) + b"\xff\xff\xff\xff\x20\0" + bytes(20),
+        b"\0\0\2" + bytes(9) + b"\0\x20\0\x20\x20\0" + bytes(20),
+        b"BM" + bytes(100),
+        b"GIF89a" + b"\xff" * 100,
+        b"II*\0\x08\0\0\0" + b"\xff" * 100,
+    ],
+    ids=["huge", "claim", "bmp", "gif", "tiff"],
+)
+def test_broken_images_of_old_formats_are_left_out(data: bytes) -> None:
+    scene = import_scene(packed({"a.obj": OBJ, "m.mtl": MTL, "wood.png": data}), "test", LIGHT)
+    assert not scene.materials[0].textures
+    assert any("Skipped “wood.png”" in warning for warning in scene.warnings)
 
 
 @pytest.mark.parametrize(
@@ -244,7 +284,14 @@ def test_an_archive_in_an_archive_is_not_opened() -> None:
     assert "is not .glb" in rejected(packed({"a.obj": packed({"a.obj": OBJ})}))
 
 
-FUZZED = {"obj": OBJ, "text": text(True), "little": binary("<", True), "zip": packed({"a.obj": OBJ, "m.mtl": MTL})}
+STL = bytes(80) + b"\1\0\0\0" + np.array([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], "<f4").tobytes() + b"\0\0"
+FUZZED = {
+    "obj": OBJ,
+    "stl": STL,
+    "text": text(True),
+    "little": binary("<", True),
+    "zip": packed({"a.obj": OBJ, "m.mtl": MTL}),
+}
 
 
 @pytest.mark.parametrize("kind", FUZZED)

@@ -39,8 +39,19 @@ def test_a_file_that_was_not_uploaded_is_missing_even_if_it_is_on_disk(tmp_path:
     outgoing = UploadedFiles({}, "meshes/triangle.obj")
     missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, outgoing)
     assert any("Missing material file" in warning for warning in missing.warnings)
-    with pytest.raises(SceneError, match="outside the scene's folder"):
-        import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, outgoing)
+    outside = import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, outgoing)
+    assert any("outside the scene's folder" in warning for warning in outside.warnings)
+    assert outside.materials[0].terms[0]["color"] != [1, 0, 0]
+
+
+@pytest.mark.parametrize("name", ["LOOKS/Größe.mtl", "looks/Gro\u0308ße.MTL"])
+def test_names_differ_in_case_and_in_unicode_forms(tmp_path: Path, name: str) -> None:
+    (tmp_path / "Looks").mkdir()
+    (tmp_path / "Looks" / "größe.mtl").write_bytes(b"newmtl Red\nKd 1 0 0\n")
+    (tmp_path / "a.obj").write_bytes(TRIANGLE.replace(b"../looks/red.mtl", name.encode()))
+    scene = import_scene(tmp_path / "a.obj", "test", LIGHT)
+    assert scene.materials[0].terms[0]["color"] == [1, 0, 0]
+    assert scene.warnings == ()
 
 
 @pytest.mark.parametrize("image", ["../images/red.png", "looks/red.png"])

@@ -51,10 +51,24 @@ def test_scene_formats_are_detected_by_content_and_may_have_more_files(client: T
     assert (body["name"], body["variants"]) == ("Leaf", [])
     assert body["materials"][0]["terms"][0]["color"] == [1, 0, 0]
     assert ["gone.mtl" in warning["text"] for warning in body["warnings"]] == [True]
-    assert body["warnings"] == [{"text": body["warnings"][0]["text"], "severity": "unsupported"}]
-    refused = client.post("/api/scenes", files={"scene": ("evil.obj", obj.replace(b"gone.mtl", b"../environment.hdr"))})
+    assert body["warnings"] == [{"text": body["warnings"][0]["text"], "severity": "unsupported", "where": "“gone.mtl”"}]
+    evil = {"scene": ("evil.obj", obj.replace(b"gone.mtl", b"../environment.hdr"))}
+    warnings = client.post("/api/scenes", files=evil).json()["warnings"]
+    assert any("outside the scene" in warning["text"] for warning in warnings)
+
+
+def test_import_options_are_applied_and_returned(client: TestClient) -> None:
+    obj = b"v 0 0 0\nv 100 0 0\nv 0 0 200\nf 1 2 3\n"
+    plain = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}).json()
+    assert plain["import_options"] == {"up": "file", "unit": "file", "recenter": "auto"}
+    options = {"up": "z", "unit": "cm", "recenter": "always"}
+    created = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}, data=options)
+    assert created.status_code == 201, created.text
+    scene = client.get(f"/api/scenes/{created.json()['id']}").json()
+    assert scene["import_options"] == options
+    assert scene["id"] != plain["id"]
+    refused = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}, data={"up": "x"})
     assert refused.status_code == 422
-    assert "outside the scene" in refused.json()["detail"]
 
 
 def test_built_in_scenes_are_listed_and_imported_by_name(client: TestClient) -> None:

@@ -7,7 +7,7 @@ import shutil
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,7 @@ class SceneRecord:
             old ones lack the last three.
         variants: partial looks of the file, by name.
         lights: names of the scene's lights.
+        import_options: `relume.scene_io.import_options.ImportOptions` other than the defaults.
     """
 
     id: str
@@ -50,6 +51,7 @@ class SceneRecord:
     variants: dict[str, dict[str, Any]]
     lights: tuple[str, ...] = ()
     aspects: tuple[float | None, ...] = ()
+    import_options: Mapping[str, str] = field(default_factory=dict)
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
@@ -86,6 +88,7 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
+        "import_options": scene.import_options,
     }
 
 
@@ -111,6 +114,11 @@ def list_scenes(ledger: Ledger) -> list[SceneRecord]:
     """All scenes, newest first."""
     with ledger.sessions() as session:
         return [_record(row) for row in session.scalars(select(SceneRow).order_by(SceneRow.created.desc()))]
+
+
+def last_import_options(ledger: Ledger, name: str) -> Mapping[str, str]:
+    """Import options of the newest scene with a name, for an import of its changed file; empty without one."""
+    return next((record.import_options for record in list_scenes(ledger) if record.name == name), {})
 
 
 def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
@@ -199,4 +207,5 @@ def _record(row: SceneRow) -> SceneRecord:
         variants=summary.get("variants", {}),  # rows from before this field
         lights=tuple(summary.get("lights", ())),
         aspects=tuple(summary.get("aspects", ())),
+        import_options=summary.get("import_options", {}),
     )

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
-
-from relume.assets.btf.btf_store import STORE
+from relume.assets.btf.btf_store import load_shape
 from relume.core.cache import check_assets
 from relume.core.errors import count_text
 
@@ -39,17 +37,4 @@ def check_btfs_fit(terms: Iterable[Mapping[str, Any]]) -> None:
     if names:
         label = count_text(len(names), "measured texture (BTF)", "measured textures (BTF) at once")
         remedy = "use fewer or smaller ones, or raise the cache budget"
-        check_assets(label, sum(map(_stored_bytes, names)), remedy)
-
-
-def _stored_bytes(data: str) -> int:
-    """Memory of a stored BTF."""
-    path = STORE.resolve(data)
-    try:
-        levels = np.load(path / "levels.npy", allow_pickle=False)
-        shape = np.load(path / "eigen.npy", mmap_mode="r", allow_pickle=False).shape
-    except (OSError, ValueError, EOFError) as problem:
-        raise STORE.damaged_error(path) from problem
-    if levels.ndim != 2 or levels.shape[1] != 3 or not len(levels) or len(shape) != 5:
-        raise STORE.damaged_error(path)
-    return memory_bytes((int(levels[0, 1]), int(levels[0, 2])), shape[0], shape[1], shape[2])
+        check_assets(label, sum(memory_bytes(*load_shape(name)) for name in names), remedy)

@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
@@ -39,6 +39,7 @@ _TYPES = {
     "shared_cluster": np.uint8, "shared_weight": np.int8,
 }  # fmt: skip
 _MAX_STORED_BYTES = 4 << 30  # of all arrays, not deflated
+_MAX_LEVELS_BYTES = 4096
 
 
 @dataclass(frozen=True)
@@ -131,6 +132,42 @@ def load_btf(data: str) -> LocalPcaBtf:
         NotFoundError: it does not exist. MaterialError: its files are damaged.
     """
     return _load(STORE.resolve(data))
+
+
+def load_shape(data: str) -> tuple[tuple[int, int], int, int, int]:
+    """Height and width, directions, clusters and components of a stored BTF, from headers alone.
+
+    Raises:
+        NotFoundError: it does not exist. MaterialError: its files are damaged.
+    """
+    path = STORE.resolve(data)
+    try:
+        if (path / _ARRAYS_FILE).exists():
+            with ZipFile(path / _ARRAYS_FILE) as archive:
+                levels = _read_levels(archive)
+                with archive.open("eigen.npy") as file:
+                    components, directions, clusters = _header_shape(file)[:3]
+        else:
+            levels = _array(path, "levels")
+            directions, clusters, components = _array(path, "eigen").shape[:3]
+        _, height, width = levels[0]
+    except (OSError, ValueError, KeyError, IndexError, EOFError, BadZipFile, zlib.error) as problem:
+        raise STORE.damaged_error(path) from problem
+    return (int(height), int(width)), directions, clusters, components
+
+
+def _read_levels(archive: ZipFile) -> NDArray[np.int32]:
+    if archive.getinfo("levels.npy").file_size > _MAX_LEVELS_BYTES:
+        raise ValueError("levels")
+    with archive.open("levels.npy") as file:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False), np.int32)
+
+
+def _header_shape(file: IO[bytes]) -> tuple[int, ...]:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape: tuple[int, ...] = read(file)[0]
+    return shape
 
 
 @asset_cached("BTF file")

@@ -1,231 +1,130 @@
-"""Material libraries of OBJ files: numbers and images by keyword, and their conversion to materials.
+"""Material libraries of OBJ files: numbers and images by keyword.
 
 Wavefront's Material Library File format, and its common PBR extension.
 """
 
 from __future__ import annotations
 
-import posixpath
-from contextlib import suppress
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from jaxtyping import Shaped
-from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
-from relume.image_io.decode import U8, Decoder
-from relume.scene.model import Material, Opacity, Texture, TextureEncoding
-from relume.scene.opacity import make_opacity
-from relume.scene.unique_names import unique_name
-from relume.scene_io.gltf.texture_resampling import NOISE
-from relume.scene_io.obj_ply.mtl_dialects import Gloss, MtlMaterial, detect_dialect, gray_terms, make_mtl_terms
-from relume.scene_io.referenced_files import Companions
+from relume.core.import_warnings import ImporterWarning
+from relume.scene_io.obj_ply.mtl_dialects import MtlMap, MtlMaterial, detect_dialect
+from relume.scene_io.obj_ply.text import Faults, counted, decode_text, number, plain_lines, strip_comment
 
-F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
 MAX_MATERIALS = 1_000
+MAX_NUMBER = 1e6
 NUMBERS = {"Kd": 3, "Ks": 3, "Ke": 3, "Ns": 1, "Pr": 1, "Pm": 1, "d": 1, "Tr": 1}
-MINOR_NUMBERS = {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}  # invalid values are ignored
+NUMBERS |= {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}
+NORMAL_MAP_KEYWORDS = ("norm", "map_Bump")
+USED_MAPS = ("map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *NORMAL_MAP_KEYWORDS)
+OTHER_MAPS = ("map_Ka", "map_aat", "disp", "refl")
+SPELLINGS = {keyword.lower(): keyword for keyword in (*NUMBERS, *USED_MAPS, *OTHER_MAPS)}
+SPELLINGS |= {"bump": "map_Bump", "map_kn": "norm", "map_norm": "norm"}
+"""Keywords by their lower case: programs differ."""
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-clamp": 1}
-OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
-NORMAL_MAP_KEYWORDS = ("norm", "map_Bump", "map_bump", "bump")
-MAX_STRENGTH = 100.0
-USED_MAPS = {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *NORMAL_MAP_KEYWORDS}
-HARMLESS_MAPS = {"map_Ka", "map_aat"}  # ambient light, and antialiasing of textures
+OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1, "-colorspace": 1}
+"""Largest number of arguments; of those with three, v and w may be missing."""
+DEFAULTS: dict[str, Sequence[list[Any]]] = {
+    "-mm": ([0.0, 1.0],),
+    "-t": ([0.0] * 3,),
+    "-cc": (["off"],),
+    "-colorspace": (["srgb"], ["linear"], ["raw"]),
+}
+"""Arguments of unsupported options that change nothing; those of all others never do."""
+FILLS = {"-s": 1.0, "-o": 0.0, "-t": 0.0}
 
 
-def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
-    """Read the materials of a library by name.
+def read_library(data: bytes, folder: str, warnings: list[ImporterWarning]) -> dict[str, MtlMaterial]:
+    """Read the materials of a library by name; numbers that cannot be used are left out.
 
     Args:
-        folder: folder of the library, relative to the scene.
+        data: the file. folder: of the library, relative to the scene.
+        warnings: gets one sentence for all numbers that were left out.
     Raises:
-        SceneError: too large, too many materials, or a line is invalid.
+        SceneError: too large, or too many materials.
     """
     if len(data) > MAX_LIBRARY_BYTES:
         raise SceneError(f"the material file is larger than {MAX_LIBRARY_BYTES >> 20} MB; export it again")
     materials: dict[str, MtlMaterial] = {}
-    lines = data.decode("utf-8", "replace").splitlines()
+    lines = decode_text(plain_lines(data)).split("\n")
     dialect = detect_dialect(lines)
     material = MtlMaterial(dialect=dialect)
-    for line in lines:
-        keyword, _, arguments = line.strip().partition(" ")
+    faults = Faults()
+    for line_number, line in enumerate(lines, 1):
+        written, arguments = (*line.split(maxsplit=1), "", "")[:2]
+        keyword = SPELLINGS.get(written.lower(), written)
         if keyword == "newmtl":
-            material = materials[arguments.strip()[:1_000]] = MtlMaterial(folder, dialect)
+            material = materials[strip_comment(arguments)[:1_000]] = MtlMaterial(folder, dialect)
             if len(materials) > MAX_MATERIALS:
                 raise SceneError(f"the material file has more than {MAX_MATERIALS:,} materials; remove some")
         elif keyword in NUMBERS:
-            material.numbers[keyword] = _numbers(arguments.split(), NUMBERS[keyword], keyword)
-        elif keyword in MINOR_NUMBERS:
-            with suppress(SceneError):
-                material.numbers[keyword] = _numbers(arguments.split(), MINOR_NUMBERS[keyword], keyword)
-        elif keyword.startswith("map_") or keyword in ("bump", "norm", "disp", "refl"):
-            material.maps[keyword] = _image_name(arguments.split())
-            with suppress(SceneError, ValueError, IndexError):
-                tokens = arguments.split()
-                material.strengths[keyword] = _numbers(tokens[tokens.index("-bm") + 1 :], 1, "-bm")[0]
+            try:
+                material.numbers[keyword] = _numbers(strip_comment(arguments).split(), NUMBERS[keyword])
+            except ValueError:
+                faults.add(f"line {line_number:,}", line)
+        elif keyword.lower().startswith("map_") or keyword in (*USED_MAPS, *OTHER_MAPS):
+            material.maps[keyword] = parse_map(strip_comment(arguments).split())
+    warnings.extend(
+        faults.warnings(f"Left out {counted(faults.count, 'value')} of the material file that cannot be used:")
+    )
     return materials
 
 
-def _numbers(tokens: list[str], count: int, keyword: str) -> list[float]:
-    """Parse `count` numbers; a single number is used for all channels."""
-    try:
-        values = [float(token) for token in tokens[:count]]
-    except ValueError:
-        raise SceneError(f"{keyword} of the material file has values that are not numbers; export it again") from None
+def _numbers(tokens: list[str], count: int) -> list[float]:
+    """Parse `count` numbers; a single number is used for all channels. Raises ValueError if they cannot be used."""
+    values = [number(token) for token in tokens[:count]]
     if len(values) == 1:
         values *= count
-    if len(values) != count or not np.isfinite(values).all() or not 0 <= min(values) <= max(values) <= 1e6:
-        raise SceneError(f"{keyword} of the material file is out of range; export it again")
+    if len(values) != count or not np.isfinite(values).all() or not 0 <= min(values) <= max(values) <= MAX_NUMBER:
+        raise ValueError("out of range")
     return values
 
 
-def _image_name(tokens: list[str]) -> str:
-    """File name after the options; it may contain spaces."""
-    while tokens and tokens[0] in OPTIONS:
-        tokens = tokens[1 + OPTIONS[tokens[0]] :]
-    return " ".join(tokens)[:1_000]
+def parse_map(tokens: Sequence[str]) -> MtlMap:
+    """Parse the line of an image: its name, which may contain spaces, and options before or after it."""
+    name: list[str] = []
+    options: dict[str, list[Any]] = {}
+    k = 0
+    while k < len(tokens):
+        option, k = tokens[k], k + 1
+        if option not in OPTIONS:
+            name.append(option)
+            continue
+        if option in FILLS or option == "-mm":
+            values = _leading_numbers(tokens[k : k + OPTIONS[option]])
+            k += len(values)
+            options[option] = values + [FILLS.get(option, 1.0)] * (OPTIONS[option] - len(values))
+        elif option == "-bm":
+            options[option] = [*_leading_numbers(tokens[k : k + 1]), 1.0]
+            k += 1
+        else:
+            options[option] = [token.lower() for token in tokens[k : k + 1]]
+            k += 1
+    scale, offset = options.get("-s", [1.0, 1.0]), options.get("-o", [0.0, 0.0])
+    channel = (*options.get("-imfchan", []), "")[0]
+    return MtlMap(
+        " ".join(name).strip('"')[:1_000],
+        (scale[0], scale[1]),
+        (offset[0], offset[1]),
+        options.get("-bm", [1.0])[0],
+        options.get("-clamp") == ["on"],
+        channel if channel in ("r", "g", "b", "m", "l") else "",
+        tuple(option for option in sorted(options) if options[option] not in DEFAULTS.get(option, (options[option],))),
+    )
 
 
-class MaterialMaker:
-    """Converts materials of a library; each image is decoded once."""
-
-    def __init__(self, companions: Companions, warnings: list[ImporterWarning]) -> None:
-        self._companions = companions
-        self._warnings = warnings
-        self._decoder = Decoder()
-        self._names: dict[str, int] = {}
-        self._pixels: dict[str, U8 | None] = {}
-        self._glosses: dict[str, Gloss] = {}
-
-    def make(self, name: str, mtl_material: MtlMaterial | None) -> Material:
-        """Make a material with a unique name; gray if the library lacks it. Raises SceneError."""
-        material_name = unique_name(name or "material", self._names)
-        label = f"material {quote(material_name)}"
-        if mtl_material is None:
-            return Material(material_name, gray_terms())
-        textures = self._textures(mtl_material, label)
-        self._warn_unsupported(mtl_material, label)
-        normal_map = self._normal_map(mtl_material, label)
-        opacity = self._opacity(mtl_material, label)
-        roughness = self._roughness(mtl_material, textures, label)
-        terms, gloss = make_mtl_terms(mtl_material, textures, roughness, has_normal_map=normal_map is not None)
-        if gloss is not None:
-            self._glosses[material_name] = gloss
-        return Material(material_name, terms, textures, normal_map, opacity=opacity)
-
-    def _roughness(self, mtl_material: MtlMaterial, textures: dict[str, Texture], label: str) -> float | None:
-        """Roughness: Pr times the mean of map_Pr; None without both. A map that varies also becomes a texture."""
-        factor = mtl_material.numbers.get("Pr", [None])[0]
-        pixels = self._decode(mtl_material, "map_Pr", f"map_Pr of {label}")
-        if pixels is None:
-            return factor
-        mean = float(pixels[..., 0].mean()) / 255
-        if mean > 0 and np.ptp(pixels[..., 0]) > NOISE:
-            encoding = TextureEncoding("share", (1 / mean, 1 / mean, 1 / mean))
-            textures["roughness"] = Texture(np.ascontiguousarray(pixels[..., :1]), encoding=encoding)
-        return (factor or 1.0) * mean  # exporters write zero if there is an image
-
-    def _opacity(self, mtl_material: MtlMaterial, label: str) -> Opacity | None:
-        """Opacity: d, or 1 − Tr, times map_d."""
-        numbers = mtl_material.numbers
-        alpha_factor = min(1.0, numbers["d"][0] if "d" in numbers else 1 - min(1.0, numbers.get("Tr", [0.0])[0]))
-        if alpha_factor == 0 and "map_d" in mtl_material.maps:
-            alpha_factor = 1.0  # exporters write zero if there is an image
-        pixels = self._decode(mtl_material, "map_d", f"map_d of {label}")
-        # a gray image, or the image of map_Kd with opacity in its alpha channel
-        alpha = None if pixels is None else pixels[..., 3 if np.ptp(pixels[..., 3]) else 0]
-        return make_opacity(alpha, ("repeat", "repeat"), alpha_factor, None, label, self._warnings)
-
-    def emission(self, material: Material, mtl_material: MtlMaterial | None) -> Shaped[F64, " 3"]:
-        """Ke, the emitted radiance; the caller multiplies it by the emission texture."""
-        if mtl_material is None:
-            return np.zeros(3)
-        factor = np.array(mtl_material.numbers.get("Ke", [0.0, 0.0, 0.0]))
-        # exporters write zero if there is an image
-        return np.ones(3) if "emission" in material.textures and not factor.any() else factor
-
-    def _textures(self, mtl_material: MtlMaterial, label: str) -> dict[str, Texture]:
-        textures = {}
-        for keyword, channel in (("map_Kd", "diffuse"), ("map_Ks", "specular"), ("map_Ke", "emission")):
-            texture = self._image(mtl_material, keyword, f"{keyword} of {label}", TextureEncoding("srgb"))
-            if texture is not None:
-                textures[channel] = texture
-        return textures
-
-    def _image(self, mtl_material: MtlMaterial, keyword: str, label: str, encoding: TextureEncoding) -> Texture | None:
-        pixels = self._decode(mtl_material, keyword, label)
-        return None if pixels is None else Texture(np.ascontiguousarray(pixels[..., :3]), encoding=encoding)
-
-    def _decode(self, mtl_material: MtlMaterial, keyword: str, label: str) -> U8 | None:
-        """Decoded RGBA image. (height, width, 4)"""
-        name = mtl_material.maps.get(keyword)
-        if not name:
-            return None
-        path = posixpath.join(mtl_material.folder, name.replace("\\", "/"))
-        if path not in self._pixels:
-            data = self._companions.read(path, label)
-            if data is None and mtl_material.folder and not name.startswith(".."):
-                data = self._companions.read(name, label)  # some exporters write paths relative to the scene
-            self._pixels[path] = None if data is None else self._decoder.decode(data, label)
-        if self._pixels[path] is None:
-            self._warnings.append(unsupported(f"Missing image “{_printable(name)}” ({label})."))
-        return self._pixels[path]
-
-    def _normal_map(self, mtl_material: MtlMaterial, label: str) -> Texture | None:
-        """The normal map of `norm`, or of a bump map if its image is a normal map; warns about height maps."""
-        for keyword in (keyword for keyword in NORMAL_MAP_KEYWORDS if mtl_material.maps.get(keyword)):
-            map_label = f"the normal map of {label}" if keyword == "norm" else f"{keyword} of {label}"
-            strength = min(mtl_material.strengths.get(keyword, 1.0), MAX_STRENGTH)
-            try:
-                texture = self._image(
-                    mtl_material, keyword, map_label, TextureEncoding("normal", (strength, strength, 1.0))
-                )
-            except SceneError as error:
-                if keyword == "norm":
-                    raise
-                self._warnings.append(unsupported(f"Skipped a normal map: {error}."))
-                continue
-            if texture is None or keyword == "norm" or is_normal_map(texture.pixels):
-                return texture
-            name = _printable(mtl_material.maps[keyword])
-            message = f"“{name}” ({map_label}) is a height map, which isn't supported; use a normal map instead."
-            self._warnings.append(unsupported(message))
-        return None
-
-    def _warn_unsupported(self, mtl_material: MtlMaterial, label: str) -> None:
-        for keyword in sorted(mtl_material.maps.keys() - USED_MAPS):
-            make_warning = ignored if keyword in HARMLESS_MAPS else unsupported
-            name = _printable(mtl_material.maps[keyword])
-            self._warnings.append(make_warning(f"Ignored “{name}” ({keyword[:40]} of {label}): not supported."))
-        unused_keywords = [
-            number_keyword
-            for number_keyword in ("Ps", "aniso")
-            if mtl_material.numbers.get(number_keyword, [0.0])[0] > 0
-        ]
-        self._warnings.extend(
-            approximated(f"Ignored {number_keyword} of {label}: not supported.") for number_keyword in unused_keywords
-        )
-
-    def warn_gloss(self) -> None:
-        """Warn once for all materials about each interpretation of Ks."""
-        for gloss in Gloss:
-            names = [name for name, material_gloss in self._glosses.items() if material_gloss is gloss]
-            if names:
-                suffix = f" and {len(names) - 1} more" if len(names) > 1 else ""
-                self._warnings.append(approximated(f"Ks of material {quote(names[0])}{suffix} {gloss.value}"))
-
-
-def is_normal_map(pixels: Shaped[U8, "height width channels"]) -> bool:
-    """True if an image with 3 or 4 channels contains unit vectors about +z, unlike a height map."""
-    step = 1 + max(pixels.shape[:2]) // 512  # a subset is enough
-    vectors = pixels[::step, ::step, :3].reshape(-1, 3) / np.float32(127.5) - 1
-    x, y, z = vectors.mean(axis=0)
-    length = np.abs(np.linalg.norm(vectors, axis=1) - 1).mean()
-    return bool(z > 0.5 and max(abs(x), abs(y)) < 0.25 and length < 0.15)
-
-
-def _printable(name: str) -> str:
-    """Return the last 60 characters of a file name, in ASCII; its end is more informative than its start."""
-    return ("…" if len(name) > 60 else "") + name[-60:].encode("ascii", "replace").decode()
+def _leading_numbers(tokens: Sequence[str]) -> list[float]:
+    """The finite numbers before the first other word."""
+    values: list[float] = []
+    for token in tokens:
+        try:
+            value = float(token)
+        except ValueError:
+            break
+        values.append(value if abs(value) <= MAX_NUMBER else 1.0)
+    return values

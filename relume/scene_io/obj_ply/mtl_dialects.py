@@ -55,15 +55,35 @@ class Gloss(Enum):
     )
 
 
+@dataclass(frozen=True)
+class MtlMap:
+    """An image of a material, with the options of its line.
+
+    Attributes:
+        name: file name, relative to the folder of the library.
+        scale, offset: UV coordinates in the image are UV · scale + offset, v from the bottom.
+        strength: of a bump map. clamp: the image does not repeat. channel: "r", "g", "b", "m" (alpha), "l" (luminance),
+            or "" for none in particular.
+        ignored_options: options that change the image and are not supported.
+    """
+
+    name: str
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    strength: float = 1.0
+    clamp: bool = False
+    channel: str = ""
+    ignored_options: tuple[str, ...] = ()
+
+
 @dataclass
 class MtlMaterial:
-    """One `newmtl`: its numbers; image names by keyword, relative to `folder`; and strengths of its bump maps."""
+    """One `newmtl`: its numbers and its images, by keyword; `folder` of the library, relative to the scene."""
 
     folder: str = ""
     dialect: Dialect = Dialect.COMMON
     numbers: dict[str, list[float]] = field(default_factory=dict)
-    maps: dict[str, str] = field(default_factory=dict)
-    strengths: dict[str, float] = field(default_factory=dict)
+    maps: dict[str, MtlMap] = field(default_factory=dict)
 
 
 def detect_dialect(lines: Sequence[str]) -> Dialect:

@@ -1,7 +1,8 @@
-"""Reader of Wavefront OBJ: keeps the lines that describe triangles, in file order.
+"""Reader of Wavefront OBJ: keeps the lines that describe polygons, in file order.
 
-Object Files, appendix B1 of Wavefront's Advanced Visualizer manual. Polygons become fans; curves, surfaces, points and
-lines are ignored. Negative indices count back from the current line.
+Object Files, appendix B1 of Wavefront's Advanced Visualizer manual. Curves, surfaces, points and lines are ignored.
+Negative indices count back from the current line. A line that cannot be read is left out; of vertices, normals and UV
+coordinates it counts as NaN, so that the indices of others stay right.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ import io
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Shaped
@@ -18,24 +18,39 @@ from numpy.typing import NDArray
 
 from relume.core.color import srgb_decode
 from relume.core.errors import SceneError
+from relume.core.import_warnings import ImporterWarning, approximated, ignored
 from relume.scene.validate import MAX_TRIANGLES
-from relume.scene_io.obj_ply.weld import Corners
+from relume.scene_io.obj_ply.polygons import OUT_OF_RANGE, Polygons
+from relume.scene_io.obj_ply.text import (
+    Faults,
+    before_comment,
+    counted,
+    decode_text,
+    number,
+    plain_lines,
+    strip_comment,
+)
 
 MAX_LINE_BYTES = 1 << 20
 MAX_GROUPS = 10_000
-_NUM_COLORED_TOKENS = 7  # tokens of a vertex with a color
-IGNORED_KEYWORDS = {b"p", b"l", b"curv", b"curv2", b"surf"}
+MAX_INDEX = 2**40
+BYTE_COLORS = 2.0  # vertex colors above are numbers up to 255, not in [0, 1]
+COLORED_TOKENS = (7, 8)  # tokens of a vertex with a color, or with a color and alpha
+IGNORED_KEYWORDS = {b"p": "points", b"l": "lines", b"curv": "curves", b"curv2": "curves", b"surf": "surfaces"}
+WIDTHS = {b"v": 3, b"vn": 3, b"vt": 2}
 
 
 @dataclass
 class Obj:
-    """The triangles of an OBJ file and its references.
+    """The polygons of an OBJ file and its references.
 
     Attributes:
-        colors: vertex colors after the coordinates of `v` lines; ignored unless every vertex has one.
-        libraries: names of material files.
-        groups: triangles, nine indices each, by object and material.
+        colors: vertex colors after the coordinates of `v` lines; NaN for vertices without one.
+        libraries: names of material files, as written: one or several to a line.
+        groups: index of each pair of object and material.
+        corners: indices of position, UV and normal. lengths, group: corners and group of each polygon.
         ignored_keywords: kinds of unsupported lines.
+        faults: lines that cannot be read.
     """
 
     positions: array[float] = field(default_factory=lambda: array("d"))
@@ -43,51 +58,65 @@ class Obj:
     normals: array[float] = field(default_factory=lambda: array("d"))
     colors: array[float] = field(default_factory=lambda: array("d"))
     libraries: list[str] = field(default_factory=list)
-    groups: dict[tuple[str, str], array[int]] = field(default_factory=dict)
-    ignored_keywords: set[str] = field(default_factory=set)
+    groups: dict[tuple[str, str], int] = field(default_factory=dict)
+    corners: array[int] = field(default_factory=lambda: array("q"))
+    lengths: array[int] = field(default_factory=lambda: array("q"))
+    group: array[int] = field(default_factory=lambda: array("q"))
+    ignored_keywords: set[bytes] = field(default_factory=set)
+    faults: Faults = field(default_factory=Faults)
 
-    def vertex_colors(self) -> Shaped[NDArray[np.float32], "positions 3"] | None:
-        """Linear colors of all positions, or None."""
-        colors = _rows(self.colors, 3)
-        if len(colors) == 0 or len(self.colors) != len(self.positions) or not np.isfinite(colors).all():
+    def polygons(self) -> Polygons:
+        """The polygons of all groups."""
+        return Polygons(np.array(self.corners, np.int64).reshape(-1, 3), np.array(self.lengths, np.int64))
+
+    def vertex_colors(self, warnings: list[ImporterWarning]) -> Shaped[NDArray[np.float32], "positions 3"] | None:
+        """Linear colors of all positions, or None; vertices without one are white."""
+        colors = as_rows(self.colors, 3)
+        if len(colors) == 0:
             return None
-        return srgb_decode(np.clip(colors, 0, 1).astype(np.float32))
+        colors = np.pad(colors, ((0, len(self.positions) // 3 - len(colors)), (0, 0)), constant_values=np.nan)
+        is_missing = np.asarray(~np.isfinite(colors).all(axis=1))
+        if is_missing.any():
+            message = f"Vertices of the .obj file without a color are white: {int(is_missing.sum()):,}."
+            warnings.append(approximated(message))
+        colors[is_missing] = np.nan
+        if np.nanmax(colors, initial=0.0) > BYTE_COLORS:
+            warnings.append(approximated("The vertex colors were read as numbers from 0 to 255: some are above 1."))
+            colors = colors / 255
+        return srgb_decode(np.clip(np.where(is_missing[:, None], 1, colors), 0, 1).astype(np.float32))
 
-    def corners(self) -> dict[tuple[str, str], Corners]:
-        """The triangles of each group, with v from the top."""
-        positions, uvs, normals = _rows(self.positions, 3), _rows(self.uvs, 2), _rows(self.normals, 3)
-        uvs[:, 1] = 1 - uvs[:, 1]
-        return {
-            key: Corners(positions, uvs, normals, np.frombuffer(group, np.int64).reshape(-1, 3, 3))
-            for key, group in self.groups.items()
-        }
+    def warnings(self) -> list[ImporterWarning]:
+        """Warnings about lines that were left out."""
+        kinds = sorted({IGNORED_KEYWORDS[keyword] for keyword in self.ignored_keywords})
+        return [
+            *self.faults.warnings(
+                f"Left out {counted(self.faults.count, 'line')} of the .obj file that cannot be read:"
+            ),
+            *(ignored(f"The file's {kind} aren't supported; only faces are shown.") for kind in kinds),
+        ]
 
 
 def read_obj(data: bytes) -> Obj:
     """Read the lines of a file.
 
     Raises:
-        SceneError: a line is invalid, or there are too many triangles or objects.
+        SceneError: a line is too long, or there are too many triangles or objects.
     """
     obj = Obj()
     object_name, material = "", ""
     num_triangles = 0
-    for number, line in enumerate(_lines(data), 1):
+    for line_number, line in enumerate(_lines(data), 1):
         tokens = line.split()
         if not tokens:
             continue
         kind = tokens[0]
+        if b"#" in line and (kind == b"f" or kind in WIDTHS):
+            tokens = before_comment(tokens)
         try:
-            if kind == b"v":
-                obj.positions.extend([float(tokens[1]), float(tokens[2]), float(tokens[3])])
-                if len(tokens) == _NUM_COLORED_TOKENS:
-                    obj.colors.extend([float(tokens[4]), float(tokens[5]), float(tokens[6])])
-            elif kind == b"vn":
-                obj.normals.extend([float(tokens[1]), float(tokens[2]), float(tokens[3])])
-            elif kind == b"vt":
-                obj.uvs.extend([float(tokens[1]), float(tokens[2]) if len(tokens) > 2 else 0.0])
+            if kind in WIDTHS:
+                _add_vector(obj, kind, tokens)
             elif kind == b"f":
-                num_triangles += _add_face(obj, _group(obj, object_name, material), tokens[1:])
+                num_triangles += _add_face(obj, (object_name, material), tokens[1:])
             elif kind == b"usemtl":
                 material = _text(line, kind)
             elif kind == b"o":
@@ -95,45 +124,61 @@ def read_obj(data: bytes) -> Obj:
             elif kind == b"mtllib":
                 obj.libraries.append(_text(line, kind))
             elif kind in IGNORED_KEYWORDS:
-                obj.ignored_keywords.add(kind.decode())
+                obj.ignored_keywords.add(kind)
         except SceneError:
             raise
-        except (ValueError, IndexError, OverflowError):
-            printable = line[:40].decode("ascii", "replace").strip()
-            raise SceneError(
-                f"line {number:,} of the .obj file cannot be read ({printable!r}); export it again"
-            ) from None
+        except (ValueError, OverflowError):
+            obj.faults.add(f"line {line_number:,}", line[:80].decode("ascii", "replace"))
+            if kind in WIDTHS:
+                _values(obj, kind).extend([np.nan] * WIDTHS[kind])
         if num_triangles > MAX_TRIANGLES:
             raise SceneError(f"the .obj file has more than {MAX_TRIANGLES:,} triangles; simplify it")
     return obj
 
 
-def _lines(data: bytes) -> io.BytesIO | list[bytes]:
-    """Lines, with continuations after a backslash joined."""
-    if max(map(len, io.BytesIO(data)), default=0) > MAX_LINE_BYTES:
+def _lines(data: bytes) -> io.BytesIO:
+    lines = plain_lines(data)
+    if max(map(len, io.BytesIO(lines)), default=0) > MAX_LINE_BYTES:
         raise SceneError(f"a line of the .obj file is longer than {MAX_LINE_BYTES:,} bytes; export it again")
-    return io.BytesIO(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ") if b"\\" in data else data)
+    return io.BytesIO(lines)
 
 
-def _group(obj: Obj, object_name: str, material: str) -> array[int]:
-    group = obj.groups.get((object_name, material))
-    if group is None:
-        if len(obj.groups) >= MAX_GROUPS:
-            raise SceneError(f"the .obj file has more than {MAX_GROUPS:,} objects; merge them")
-        group = obj.groups[object_name, material] = array("q")
-    return group
+def _values(obj: Obj, kind: bytes) -> array[float]:
+    return obj.positions if kind == b"v" else obj.normals if kind == b"vn" else obj.uvs
 
 
-def _add_face(obj: Obj, group: array[int], tokens: Sequence[bytes]) -> int:
-    """Append a polygon as a fan; return the number of its triangles."""
+def _add_vector(obj: Obj, kind: bytes, tokens: Sequence[bytes]) -> None:
+    """Append a vertex, a normal or UV coordinates, whose second is zero if it is missing."""
+    width = WIDTHS[kind]
+    vector = tokens[1 : 1 + width]
+    if len(vector) < width:
+        if kind != b"vt" or not vector:
+            raise ValueError("too few numbers")
+        vector = [*vector, b"0"]
+    try:
+        values = list(map(float, vector))
+    except ValueError:
+        values = list(map(number, vector))
+    if kind == b"v" and len(tokens) in COLORED_TOKENS:
+        color = list(map(number, tokens[4:7]))
+        obj.colors.extend([np.nan] * (len(obj.positions) - len(obj.colors)))
+        obj.colors.extend(color)
+    _values(obj, kind).extend(values)
+
+
+def _add_face(obj: Obj, key: tuple[str, str], tokens: Sequence[bytes]) -> int:
+    """Append a polygon; return the number of its triangles."""
     counts = (len(obj.positions) // 3, len(obj.uvs) // 2, len(obj.normals) // 3)
-    corners = [_corner(token, counts) for token in tokens]
-    if len(corners) < 3:
+    corners = [index for token in tokens for index in _corner(token, counts)]
+    if len(tokens) < 3:
         raise ValueError("a face has fewer than three corners")
-    hub = corners[0]
-    for second, third in pairwise(corners[1:]):
-        group.extend((*hub, *second, *third))
-    return len(corners) - 2
+    group = obj.groups.setdefault(key, len(obj.groups))
+    if group >= MAX_GROUPS:
+        raise SceneError(f"the .obj file has more than {MAX_GROUPS:,} objects; merge them")
+    obj.corners.extend(corners)
+    obj.lengths.append(len(tokens))
+    obj.group.append(group)
+    return len(tokens) - 2
 
 
 def _corner(token: bytes, counts: tuple[int, int, int]) -> tuple[int, int, int]:
@@ -149,15 +194,17 @@ def _corner(token: bytes, counts: tuple[int, int, int]) -> tuple[int, int, int]:
 
 
 def _index(text: bytes, count: int) -> int:
+    """Zero-based index; those of the future are valid, those of before the first are not."""
     index = int(text)
-    if index == 0 or index < -count or index > 2**40:
-        raise ValueError("numbers start at one")
+    if index == 0 or index < -count or index > MAX_INDEX:
+        return OUT_OF_RANGE
     return index - 1 if index > 0 else count + index
 
 
 def _text(line: bytes, kind: bytes) -> str:
-    return line.strip()[len(kind) :].decode("utf-8", "replace").strip()[:1_000]
+    return strip_comment(decode_text(line.strip()[len(kind) :]))[:1_000]
 
 
-def _rows(values: array[float], width: int) -> NDArray[np.float64]:
+def as_rows(values: array[float], width: int) -> NDArray[np.float64]:
+    """An array of rows. (len(values) // width, width)"""
     return np.array(values, np.float64).reshape(-1, width)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol
@@ -12,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
+from relume.scene_io.obj_ply.text import NAN_TEXT
 
-Lists = tuple[NDArray[np.int64], NDArray[np.int64]]
+Lists = tuple[NDArray[np.int64], NDArray[Any]]
 Columns = dict[str, NDArray[Any] | Lists]
 Layout = list[tuple[str, int]]  # NumPy type and count of each field in a row
+NAN_WORD = re.compile(rf"(?<!\S){NAN_TEXT.pattern}(?!\S)", re.IGNORECASE)
 SHORT = "the .ply file has fewer rows than its header says; export or download it again"
 
 
@@ -59,9 +63,11 @@ class TextRows:
 
     def __init__(self, body: memoryview) -> None:
         try:
+            text = bytes(body).decode("ascii")
+            text = NAN_WORD.sub("nan", text) if "#" in text or "(" in text else text
             with warnings.catch_warnings():  # NumPy before 2.3 only warns if it stops at text
                 warnings.simplefilter("error", DeprecationWarning)
-                self._numbers = np.fromstring(bytes(body).decode("ascii"), np.float64, sep=" ")
+                self._numbers = np.fromstring(text, np.float64, sep=" ")
         except (ValueError, DeprecationWarning):
             raise SceneError("the .ply file has text instead of numbers; export it again") from None
         self._offset = 0
@@ -74,7 +80,7 @@ class TextRows:
     def take(self, kind: str, count: int) -> NDArray[Any]:
         """Read the next values, as in `PlyRows`."""
         if count > self.remaining:
-            raise SceneError(SHORT)
+            raise TruncatedError(SHORT)
         self._offset += count
         return self._numbers[self._offset - count : self._offset]
 
@@ -106,7 +112,7 @@ class BinaryRows:
         """Read the next values, as in `PlyRows`."""
         dtype = np.dtype(self._order + kind)
         if count * dtype.itemsize > self.remaining:
-            raise SceneError(SHORT)
+            raise TruncatedError(SHORT)
         values = np.frombuffer(self._body, dtype, count, self._offset)
         self._offset += count * dtype.itemsize
         return values
@@ -125,12 +131,18 @@ class BinaryRows:
         self._offset += rows * sum(np.dtype(kind).itemsize * count for kind, count in layout)
 
 
+class TruncatedError(SceneError):
+    """The file ends before its rows."""
+
+
 def read_element(rows: PlyRows, element: Element) -> Columns:
-    """Read the columns of the next element. Raises SceneError if there are fewer rows than in the header."""
+    """Read the columns of the next element, with fewer rows than in the header if the file ends early.
+
+    Raises:
+        SceneError: a list has an invalid length.
+    """
     if element.rows == 0 or not element.properties:
         return {}
-    if element.rows > rows.remaining // len(element.properties):
-        raise SceneError(SHORT)
     return _uniform(rows, element) or _row_by_row(rows, element)
 
 
@@ -159,7 +171,7 @@ def _uniform(rows: PlyRows, element: Element) -> Columns | None:
         items, (_, count) = next(block_iterator)
         if not (values == count).all():
             return None
-        columns[p.name] = (np.full(element.rows, count, np.int64), _whole(items.reshape(-1)))
+        columns[p.name] = (np.full(element.rows, count, np.int64), items.reshape(-1))
     rows.skip(layout, element.rows)
     return columns
 
@@ -167,38 +179,51 @@ def _uniform(rows: PlyRows, element: Element) -> Columns | None:
 def _row_by_row(rows: PlyRows, element: Element) -> Columns:
     single: dict[str, list[float]] = {p.name: [] for p in element.properties if p.count is None}
     lists: dict[str, list[NDArray[Any]]] = {p.name: [] for p in element.properties if p.count is not None}
-    for _ in range(element.rows):
-        for p in element.properties:
-            if p.count is None:
-                single[p.name].append(float(rows.take(p.type, 1)[0]))
-            else:
-                lists[p.name].append(rows.take(p.type, _length(rows.take(p.count, 1)[0])))
-    columns: Columns = {name: np.array(values) for name, values in single.items()}
+    num_rows = 0
+    with suppress(TruncatedError):
+        for _ in range(min(element.rows, rows.remaining // len(element.properties))):
+            for p in element.properties:
+                if p.count is None:
+                    single[p.name].append(float(rows.take(p.type, 1)[0]))
+                else:
+                    lists[p.name].append(rows.take(p.type, _length(rows.take(p.count, 1)[0])))
+            num_rows += 1
+    columns: Columns = {name: np.array(values[:num_rows]) for name, values in single.items()}
     for name, values in lists.items():
-        columns[name] = (np.array([len(row) for row in values], np.int64), _whole(np.concatenate(values)))
+        lengths = np.array([len(row) for row in values[:num_rows]], np.int64)
+        columns[name] = (lengths, np.concatenate([np.zeros(0), *values[:num_rows]]))
     return columns
 
 
 def _length(value: float) -> int:
-    if not 0 <= value < 2**31:
+    if not 0 <= value < 2**31 or value != int(value):
         raise SceneError("a list of the .ply file has an invalid length; export it again")
     return int(value)
 
 
-def _whole(values: NDArray[Any]) -> NDArray[np.int64]:
+def whole_numbers(values: NDArray[Any]) -> NDArray[np.int64]:
     """Indices; a value that is no integer or too large becomes -2, which is always out of range."""
-    is_whole = np.abs(values) < 2**40 if values.dtype.kind == "f" else np.ones(values.shape, np.bool_)
+    is_whole = (
+        (np.abs(values) < 2**40) & (values == np.rint(values))
+        if values.dtype.kind == "f"
+        else np.ones(values.shape, np.bool_)
+    )
     return np.where(is_whole, values, -2).astype(np.int64)
 
 
-def read_body(rows: PlyRows, elements: Sequence[Element]) -> dict[str, Columns]:
-    """Read the columns of all elements by name, up to the faces; later elements are ignored. Raises SceneError."""
+def read_body(rows: PlyRows, elements: Sequence[Element], needed: Collection[str]) -> dict[str, Columns]:
+    """Read the columns of all elements by name, up to the last of those needed. Raises SceneError.
+
+    Args:
+        rows: the body. elements: of the header. needed: names of elements; later ones are ignored.
+    """
     names = [element.name for element in elements]
     if any(a == b for a, b in pairwise(sorted(names))):
         raise SceneError("the .ply file has two elements with the same name; export it again")
-    read: dict[str, Columns] = {}
-    for element in elements:
-        read[element.name] = read_element(rows, element)
-        if {"vertex", "face"} <= read.keys():
-            break
-    return read
+    last = max((k for k, name in enumerate(names) if name in needed), default=-1)
+    return {element.name: read_element(rows, element) for element in elements[: last + 1]}
+
+
+def count_rows(columns: Columns) -> int:
+    """Number of rows that were read."""
+    return max((len(column[0] if isinstance(column, tuple) else column) for column in columns.values()), default=0)

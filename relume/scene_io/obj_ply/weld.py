@@ -8,15 +8,16 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.scene.model import F32, Material, Mesh
-from relume.scene_io.gltf.geometry import find_nondegenerate, is_usable
+from relume.scene_io.gltf.geometry import MAX_COORDINATE, find_nondegenerate, is_usable
 from relume.scene_io.gltf.uvs import compute_tangents
+from relume.scene_io.obj_ply.text import counted
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 CREASE = np.cos(np.radians(60.0))
+MIN_NORMAL = 1e-6  # length of a normal that counts as one
 MAX_FAN = 64  # triangles at a vertex that are compared pairwise; of more, only those close in file order
 
 
@@ -47,17 +48,11 @@ def make_mesh(
         material: the material; a normal map needs tangents.
         label: names the mesh in errors and warnings.
         warnings: gets one sentence for each omission or replacement.
-    Raises:
-        SceneError: a corner refers to a vertex that does not exist or is not finite.
     """
     triangles = corners.triangles
-    for k, values in enumerate((corners.positions, corners.uvs, corners.normals)):
-        lowest = 0 if k == 0 else -1
-        if triangles.size and not lowest <= int(triangles[..., k].min()) <= int(triangles[..., k].max()) < len(values):
-            raise SceneError(f"{label} has vertex indices out of range; export it again")
-    used_vertices = np.unique(triangles[..., 0])
-    if not is_usable(corners.positions[used_vertices]):
-        raise SceneError(f"{label} has positions that are NaN, infinite or huge; repair and export it again")
+    if not is_usable(corners.positions[np.unique(triangles[..., 0])]):
+        warnings.append(unsupported(f"Skipped {label}: it has positions that are NaN, infinite or huge."))
+        return None
     solid = find_nondegenerate(corners.positions, triangles[..., 0], label, warnings)
     triangles = triangles[solid]
     if len(triangles) == 0:
@@ -65,7 +60,7 @@ def make_mesh(
         return None
     points = corners.positions[triangles[..., 0]].astype(np.float32)
     normals = _normals(corners, triangles, points, label, warnings)
-    uvs = _gather_values(corners.uvs, triangles[..., 1], 2, f"UV coordinates of {label}", warnings)
+    uvs = _uvs(corners, triangles, label, warnings)
     faces = np.arange(3 * len(triangles), dtype=np.uint32).reshape(-1, 3)
     flat = points.reshape(-1, 3)
     tangents = np.zeros((len(flat), 4), np.float32)
@@ -74,27 +69,40 @@ def make_mesh(
     return Mesh(name, flat, normals, tangents, uvs, faces, number)
 
 
-def _gather_values(values: F64, indices: I64, width: int, label: str, warnings: list[ImporterWarning]) -> F32:
-    """Values of the corners; zero if a corner has none or any is not finite. (num_corners, width)"""
+def _gather_values(values: F64, indices: I64, width: int) -> tuple[F64, int]:
+    """Values of the corners, zero if a corner has none or one that is not usable; and the number of the latter."""
     flat = indices.reshape(-1)
     gathered = np.zeros((len(flat), width))
     gathered[flat >= 0] = values[flat[flat >= 0]]
-    if not is_usable(gathered):
-        warnings.append(unsupported(f"Ignored the {label}: some values are NaN, infinite or huge."))
-        return np.zeros(gathered.shape, np.float32)
-    return gathered.astype(np.float32)
+    is_wrong = ~(np.abs(gathered) <= MAX_COORDINATE).all(axis=1)  # of NaN, too
+    gathered[is_wrong] = 0
+    return gathered, int(is_wrong.sum())
+
+
+def _uvs(corners: Corners, triangles: I64, label: str, warnings: list[ImporterWarning]) -> F32:
+    """UV coordinates of the corners; zero if a corner has none. (num_corners, 2)"""
+    uvs, num_wrong = _gather_values(corners.uvs, triangles[..., 1], 2)
+    if num_wrong:
+        message = f"Set {counted(num_wrong, 'UV coordinate')} of {label} to zero: NaN, infinite or huge."
+        warnings.append(unsupported(message))
+    return uvs.astype(np.float32)
 
 
 def _normals(corners: Corners, triangles: I64, points: F32, label: str, warnings: list[ImporterWarning]) -> F32:
-    """Unit normals of the corners: the file's, or with a crease angle if it has none. (num_corners, 3)"""
-    file_normals = _gather_values(corners.normals, triangles[..., 2], 3, f"normals of {label}", warnings).astype(
-        np.float64
-    )
+    """Unit normals of the corners: the file's, or with a crease angle where it has none. (num_corners, 3)"""
+    file_normals, num_wrong = _gather_values(corners.normals, triangles[..., 2], 3)
     length = np.linalg.norm(file_normals, axis=1, keepdims=True)
-    if (length > 1e-6).all():
+    is_given = length > MIN_NORMAL
+    if num_wrong:
+        message = f"Computed {counted(num_wrong, 'normal')} of {label}: NaN, infinite or huge in the file."
+        warnings.append(approximated(message))
+    num_zero = int((~is_given[triangles[..., 2].reshape(-1) >= 0]).sum()) - num_wrong
+    if num_zero:
+        warnings.append(approximated(f"Computed {counted(num_zero, 'normal')} of {label}: without length in the file."))
+    if is_given.all():
         return np.asarray(file_normals / length, np.float32)
     creased = creased_normals(points.astype(np.float64), triangles[..., 0])
-    return np.asarray(np.where(length > 1e-6, file_normals / np.maximum(length, 1e-6), creased), np.float32)
+    return np.asarray(np.where(is_given, file_normals / np.where(is_given, length, 1), creased), np.float32)
 
 
 def creased_normals(

@@ -14,6 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.core.folder_size import folder_bytes
+from relume.scene_io.import_options import ImportOptions, Recenter, Unit, UpAxis
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import CallerDep
 from relume_server.batch.bake_previews import MAX_WIDTH
@@ -47,11 +48,14 @@ _MATERIAL_DEFAULTS = {
 DEFAULT_ASPECT = 4 / 3  # of cameras with a vertical field of view only
 SceneFile = Annotated[
     UploadFile,
-    File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files that it references"),
+    File(description="a .glb, .gltf, .obj, .ply or .stl file, or a .zip with one and the files that it references"),
 ]
 EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
 SceneName = Annotated[str, Form(max_length=200)]
 Ground = Annotated[bool, Form(description="whether to add a ground plane that catches shadows")]
+Up = Annotated[UpAxis, Form(description="axis of the file that points up")]
+FileUnit = Annotated[Unit, Form(description="unit of the file; auto guesses it from the size of the scene")]
+Recentered = Annotated[Recenter, Form(description="whether positions become relative to the middle of the scene")]
 Companions = Annotated[
     list[UploadFile],
     File(description="files that the scene references; file names include the folders"),
@@ -69,6 +73,9 @@ async def import_scene(
     name: SceneName = "",
     companions: Companions = [],  # noqa: B006  (never changed)
     ground: Ground = False,
+    up: Up = "file",
+    unit: FileUnit = "file",
+    recenter: Recentered = "auto",
 ) -> SceneBody:
     """Import a scene in a separate process; the body has a summary, and a warning for each unsupported feature."""
     if not name.isprintable():
@@ -88,7 +95,8 @@ async def import_scene(
         request = ImportRequest.create(
             services.settings, "scene", file, called, environment_path, scene.filename or "", companion_paths
         )
-        return replace(request, ground=ground)
+        options = ImportOptions(up=up, unit=unit, recenter=recenter)
+        return replace(request, ground=ground, options=options.document())
 
     identity = await services.import_queue.import_file(reservation, make_request)
     response.headers["Location"] = f"/api/scenes/{identity}"
@@ -178,7 +186,8 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str
         materials=[SceneMaterial(**{**_MATERIAL_DEFAULTS, **material}) for material in record.materials],
         lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
-        warnings=[SceneWarning(text=str(warning), severity=warning.severity) for warning in record.warnings],
+        warnings=[SceneWarning.model_validate(warning.document()) for warning in record.warnings],
+        import_options=ImportOptions.model_validate(record.import_options),
         triangles=record.num_triangles,
         thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,
         bakes=[status.id for status in bakes],

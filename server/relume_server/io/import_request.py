@@ -44,6 +44,7 @@ class ImportRequest:
         name: display name; for a built-in scene, its key.
         scene: file name of a scene or a material, with folders.
         companions: paths of a scene's companion files, by name.
+        options: fields of `relume.scene_io.import_options.ImportOptions`.
         ground: whether to add a ground plane. period: side of one period, meters, if known.
         seconds: limit of processor and wall time. max_bytes: maximum size in bytes of address space.
         max_file_bytes: maximum size in bytes of each written file.
@@ -61,6 +62,7 @@ class ImportRequest:
     period: float | None = None
     scene: str = ""
     companions: dict[str, str] = field(default_factory=dict)
+    options: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def create(
@@ -210,10 +212,12 @@ def _write_scene(request: ImportRequest, scene: Scene) -> str:
 
 def _read_scene(request: ImportRequest) -> Scene:
     from relume.assets.environments.read_environment import read_environment
+    from relume.scene_io.import_options import ImportOptions
     from relume.scene_io.import_scene import import_scene, read_file
     from relume.scene_io.referenced_files import UploadedFiles
 
     environment = None if request.environment is None else read_environment(request.environment, "Environment")
     uploaded_files = UploadedFiles({name: Path(path) for name, path in request.companions.items()}, request.scene)
     # bytes: files next to it on this disk are not part of the upload
-    return import_scene(read_file(request.file), request.name, environment, uploaded_files)
+    options = ImportOptions.model_validate(request.options)
+    return import_scene(read_file(request.file), request.name, environment, uploaded_files, options)

@@ -10,6 +10,7 @@ from pydantic import Field
 from relume.core.import_warnings import Severity
 from relume.look.document import MAX_BOUNCES
 from relume.look.model import PathFilter
+from relume.scene_io.import_options import ImportOptions
 from relume_server.schemas.base import Body, Id, Name
 from relume_server.schemas.cameras import CameraBody, CameraFrame
 from relume_server.schemas.comments import MAX_PICTURE_TEXT
@@ -58,17 +59,18 @@ class SceneVariant(Body):
 
 class SceneWarning(Body):
     """An import warning. `severity`: the feature is missing or wrong in the image ("unsupported"), looks much the same
-    ("approximated"), or does not change the image ("ignored").
+    ("approximated"), or does not change the image ("ignored"). `where`: the part of the file, empty for all of it.
     """
 
     text: str
     severity: Severity
+    where: str
 
 
 class SceneBody(Body):
     """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
 
-    `warnings`: most severe first.
+    `warnings`: most severe first. `import_options`: for the next import of its file.
     """
 
     id: str
@@ -79,6 +81,7 @@ class SceneBody(Body):
     lights: list[str]
     variants: list[SceneVariant]
     warnings: list[SceneWarning]
+    import_options: ImportOptions
     triangles: int
     thumbnail: str | None
     bakes: list[str]

@@ -12,7 +12,7 @@ from relume.core.cache import Cache
 from relume.live.free_camera import shade_lobe_rays, shared_lobe_rays
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.lobe_terms import split_terms
-from relume.live.free_camera.static_view_jobs import StaticViewState, residual_job
+from relume.live.free_camera.static_view_jobs import StaticViewState, correction_job
 from relume.live.opened.openers import open_bake
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import complete, validate
@@ -119,9 +119,9 @@ def test_the_residual_leaves_indirect_light_in_a_polished_surface(white, roughne
     before = picture.image()
     view_state = StaticViewState(builder.make_static_view, bake.cache, (CAMERA, size), look, None)
     applied = []
-    job = residual_job(view_state, copy.copy(picture), (0, 0), applied.append)
+    job = correction_job(view_state, picture.unwatched(), (0, 0), applied.append)
     job.apply(job.run(lambda share: None, lambda: False))
-    is_chrome = picture.stored_scene.face_material[np.maximum(picture.gbuffer.hits.face, 0)] == 0
+    is_chrome = bake.stored_scene.face_material[np.maximum(picture.gbuffer.hits.face, 0)] == 0
     is_chrome &= picture.gbuffer.hits.face >= 0
     pixels = before.reshape(-1, 3)[is_chrome[: size[0] * size[1]]]
     residual = np.zeros_like(before) if applied[0] is None else applied[0]

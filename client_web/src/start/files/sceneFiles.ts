@@ -3,7 +3,7 @@ import type { DroppedFile } from "./dropTypes";
 import { findReferences } from "./references";
 
 /** Scene formats of the server. */
-export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".zip"];
+export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".stl", ".zip"];
 export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
 const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif", ".tiff", ".gif"];
 /** Suffixes of companion files. */

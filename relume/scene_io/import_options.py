@@ -1,0 +1,32 @@
+"""Import options: properties of a scene that its file does not say, or says wrong."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+UpAxis = Literal["file", "y", "z", "-z"]
+Unit = Literal["file", "m", "cm", "mm", "in", "ft", "auto"]
+Recenter = Literal["auto", "always", "never"]
+
+
+class ImportOptions(BaseModel):
+    """Properties of a scene that its file does not say.
+
+    Attributes:
+        up: the file's axis that points up. "file": as the file says, +Y if it does not.
+        unit: the file's unit. "file": as the file says, meters if it does not. "auto": a guess from the size.
+        recenter: whether positions are relative to the middle of the scene. "auto": if it is more than a hundred times
+            its size from the origin, where single precision would round the shape.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    up: UpAxis = "file"
+    unit: Unit = "file"
+    recenter: Recenter = "auto"
+
+    def document(self) -> dict[str, str]:
+        """The options as JSON, without those that have their default."""
+        return self.model_dump(exclude_defaults=True)
