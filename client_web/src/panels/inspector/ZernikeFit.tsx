@@ -10,6 +10,7 @@ import { materialOf } from "../../state/scene";
 import { selectedTerms } from "../../state/selection";
 import { hasFreeCamera } from "../../state/views";
 import { isBtfTerm } from "../../state/look";
+import { isClientRendering } from "../../session/clientRendering";
 import { useServerQuery } from "./useServerQuery";
 
 /** What free cameras draw of a term while they move. */
