@@ -50,6 +50,7 @@ class OutgoingRadiance(NamedTuple):
         rows: patches with directional light. coefficients: L_j of each.
         roughening: by their highlights, see `ReflectanceOperator`.
         bins: additional light of patches with sharp highlights.
+        is_change: a difference of radiance, which may be negative.
     """
 
     isotropic: Shaped[F32, "patches 3"]
@@ -57,6 +58,7 @@ class OutgoingRadiance(NamedTuple):
     coefficients: Shaped[F32, "G 3 J"]
     roughening: Shaped[F32, " G"]
     bins: BinnedRadiance = EMPTY_BINS
+    is_change: bool = False
 
     def outgoing_light(self, patches: PatchLight, *, to_narrow_lobes: bool = True) -> OutgoingLight:
         """Tabulate for lookups by rays. to_narrow_lobes: for view samples rather than patches"""
@@ -64,8 +66,9 @@ class OutgoingRadiance(NamedTuple):
         bin_rows = np.searchsorted(self.rows, self.bins.rows)
         frames = patches.frames[self.rows]
         return radiance_from_patch(
-            pad(self.isotropic), self.rows, frames, self.coefficients, decay, (bin_rows, self.bins.radiance)
-        )
+            pad(self.isotropic), self.rows, frames, self.coefficients, decay, (bin_rows, self.bins.radiance),
+            is_positive=to_narrow_lobes and not self.is_change,
+        )  # fmt: skip
 
     def mean_to_others(self, patches: PatchLight) -> Shaped[F32, "patches 3"]:
         """Return the mean radiance of each patch toward other patches, without the binned part."""
@@ -81,8 +84,9 @@ class OutgoingRadiance(NamedTuple):
         for operand in (subtrahend, self):
             roughening[np.searchsorted(rows, operand.rows)] = operand.roughening
         return OutgoingRadiance(
-            self.isotropic - subtrahend.isotropic, rows, coefficients, roughening, self.bins.subtract(subtrahend.bins)
-        )
+            self.isotropic - subtrahend.isotropic, rows, coefficients, roughening, self.bins.subtract(subtrahend.bins),
+            is_change=True,
+        )  # fmt: skip
 
 
 def isotropic_radiance(radiance: Shaped[F32, "patches 3"]) -> OutgoingRadiance:

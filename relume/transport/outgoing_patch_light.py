@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
-from relume.math.direction_grid import SIDE, offsets_in_bin
+from relume.math.direction_grid import SIDE, bin_solid_angles, offsets_in_bin
 from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, num_functions
 from relume.patches.patch_kdtree import NO_PATCH
 
@@ -76,6 +76,8 @@ def radiance_from_patch(
     coefficients: Shaped[F32, "G 3 J"],
     decay: Shaped[F32, " G"] | None = None,
     extra_bins: tuple[NDArray[np.intp], F32] | None = None,
+    *,
+    is_positive: bool = False,
 ) -> OutgoingLight:
     """Tabulate the outgoing radiance of patches.
 
@@ -85,6 +87,8 @@ def radiance_from_patch(
         decay: decay of the smoothed table, see `decay_of`; None if only patches look it up, which gather widely:
             `smooth` is then `table`.
         extra_bins: additional binned radiance of some of the G: ascending indices, (F,), and radiance, (F, 3, SIDE²).
+        is_positive: the light is no difference: where rings take it below zero it is black, and less elsewhere, so that
+            the flux remains.
     """
     lobe = np.full(NO_PATCH + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
@@ -99,6 +103,9 @@ def radiance_from_patch(
         if extra_bins is not None:
             selection = slice(*np.searchsorted(extra_bins[0], [start, stop]))
             values[:, extra_bins[0][selection] - start] += extra_bins[1][selection]
+        if is_positive:
+            even = isotropic_radiance[rows[start:stop], :, None]
+            values = _without_negative(values + even) - even
         largest = np.maximum(values.max(axis=(0, 3)), -values.min(axis=(0, 3)))
         scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
         values /= scale[start:stop, :, None]
@@ -107,6 +114,13 @@ def radiance_from_patch(
 
     for_ranges(fill, len(rows), _ROWS_PER_RANGE)
     return OutgoingLight(isotropic_radiance, lobe, frame, scale, tables[0], tables[-1])
+
+
+def _without_negative(radiance: Shaped[F32, "*shape bins"]) -> Shaped[F32, "*shape bins"]:
+    """Clip radiance at zero, and scale the rest to its flux ∫ L cos θ dω; black without any."""
+    areas, clipped = bin_solid_angles().astype(np.float32), np.maximum(radiance, 0)
+    flux, clipped_flux = np.maximum(radiance @ areas, 0), np.maximum(clipped @ areas, np.float32(1e-30))
+    return np.asarray(clipped * (flux / clipped_flux)[..., None], np.float32)
 
 
 def decay_of(roughening: Shaped[F32, " G"]) -> Shaped[F32, " G"]:

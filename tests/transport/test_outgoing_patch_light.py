@@ -8,6 +8,7 @@ import pytest
 
 from relume.brdf.albedo import PAIRS, material_reflectance, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
+from relume.math.direction_grid import bin_solid_angles
 from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, recurrence
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
@@ -112,3 +113,23 @@ def test_uniform_light_is_reflected_uniformly():
     assert isotropic(radiance).table.shape[0] == 0
     assert ref.evaluate_outgoing(isotropic(radiance), 2, np.array([0.0, 0, 1])) == pytest.approx(3)
     assert bin_means()[0] == pytest.approx(1 / np.sqrt(np.pi), rel=1e-5)
+
+
+def test_light_is_nowhere_negative_and_its_flux_remains():
+    rng = np.random.default_rng(8)
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
+    even[:3] = rng.uniform(0.1, 1, (3, 3))
+    frame = np.tile(np.eye(3, dtype=np.float32)[:2], (3, 1, 1))
+    ringing = rng.normal(size=(3, 3, NUM_OUTGOING)).astype(np.float32)
+    tables = [
+        radiance_from_patch(even, np.arange(3), frame, ringing, np.zeros(3, np.float32), is_positive=is_positive)
+        for is_positive in (False, True)
+    ]
+    plain, positive = (
+        even[:3, None] + light.scale[:, None] * light.table.astype(np.float64) for light in tables
+    )  # (patches, bins, 3)
+    assert plain.min() < -0.1
+    assert positive.min() > -tables[1].scale.max()  # a step of the table
+    areas = bin_solid_angles()
+    flux = np.maximum(np.einsum("pbc,b->pc", plain, areas), 0)
+    np.testing.assert_allclose(np.einsum("pbc,b->pc", positive, areas), flux, atol=2e-3 * flux.max())
