@@ -71,7 +71,7 @@ def render(
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render exact images of looks, turntables, or animations from look to look.
+    """Render exact images, turntables, or animations of looks.
 
     Prints the names of the written files.
     """

@@ -36,7 +36,7 @@ def test_camera_is_saved_listed_baked_and_deleted(real_client: TestClient, scene
     frame = {"to_world": front["to_world"], "yfov": front["yfov"] / 2}
     assert [real_client.put(f"{url}/Close up", json=frame).status_code for _ in range(2)] == [201, 204]
     saved = real_client.get(f"{url}/Close up").json()
-    assert saved == {**frame, "name": "Close up", "is_placed": True}
+    assert saved == {**frame, "near": 0.0, "name": "Close up", "is_placed": True}
     views = real_client.get(f"/api/scenes/{scene}").json()["views"]
     assert [view["name"] for view in views if view["is_placed"]] == ["Close up"]
     assert real_client.get("/api/scenes").json()[0]["views"] == views

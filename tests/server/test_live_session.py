@@ -28,7 +28,7 @@ def test_hello_precedes_a_complete_exact_picture(client: TestClient, baked: Bake
         assert isinstance(hello, dict)
         assert hello["type"] == "hello"
         assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
-        camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8}
+        camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8, "near": 0.0}
         assert hello["views"] == [
             {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "camera_mode": "fixed", "bounds": None}
             for n in ("front", "left")

@@ -50,7 +50,7 @@ def test_link_keeps_the_order_of_lights(client: TestClient, baked: Baked) -> Non
 
 
 def test_link_keeps_cameras(client: TestClient, baked: Baked) -> None:
-    cameras = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
+    cameras = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0, "near": 0.1}}
     made = client.post("/api/shares", json=body(baked, cameras=cameras, sizes={"left": [90, 60]}))
     shared = client.get(made.headers["location"]).json()
     assert (shared["cameras"], shared["sizes"]) == (cameras, {"left": [90, 60]})

@@ -66,7 +66,7 @@ class Ply:
     colors: Shaped[F32, "positions 3"] | None
     face_colors: Shaped[F32, "polygons 3"] | None
     textures: tuple[str, ...]
-    texture_index: Shaped[I64, " polygons"]
+    texture_index: Shaped[I64, " textured_polygons"]
 
 
 def read_ply(data: bytes, warnings: list[ImporterWarning]) -> Ply:

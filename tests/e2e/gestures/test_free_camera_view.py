@@ -143,7 +143,7 @@ def test_a_material_is_selected_by_a_click_and_edited_after_the_camera_moved(mov
     assert box is not None
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     expect(page.locator(".inspector .card").first).to_be_visible()
-    fit = "While the camera moves: error less than 1 % with 36 basis functions"
+    fit = "While the camera moves: 1 of 36 basis functions, error less than 1 %"
     expect(page.locator(".in-motion").first).to_contain_text(fit)
     page.get_by_role("slider", name="Brightness").focus()
     for _ in range(5):
