@@ -46,7 +46,7 @@ def test_camera_is_saved_listed_baked_and_deleted(real_client: TestClient, scene
     as_it_is = real_client.post("/api/bakes", json=request | {"views": [{"name": "Close up", **frame}]})
     assert by_name.status_code == 202, by_name.text
     assert by_name.json()["id"] == as_it_is.json()["id"]
-    assert by_name.json()["recipe"]["cameras"] == [{"name": "Close up", **frame}]
+    assert by_name.json()["recipe"]["cameras"] == [{"name": "Close up", **frame, "near": 0.0}]
     assert real_client.post("/api/bakes", json=request).json()["recipe"]["cameras"] == []
     bake = ready(real_client, by_name.headers["location"])
     assert real_client.get(f"/api/bakes/{bake}/views/Close up/materials.png").status_code == 200

@@ -30,7 +30,15 @@ def test_hello_precedes_a_complete_exact_picture(client: TestClient, baked: Bake
         assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
         camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8, "near": 0.0}
         assert hello["views"] == [
-            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "camera_mode": "fixed", "bounds": None}
+            {
+                "name": n,
+                "width": WIDTH,
+                "height": HEIGHT,
+                "camera": camera,
+                "camera_mode": "fixed",
+                "bounds": None,
+                "interior_camera": None,
+            }
             for n in ("front", "left")
         ]
         assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2

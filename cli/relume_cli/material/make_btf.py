@@ -34,7 +34,7 @@ def material_make_btf(
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render a small geometry, or images of heights and colors, as a BTF.
+    """Render a BTF of a small geometry or of images.
 
     From 81 view directions under 81 light directions; nothing is measured. If it is interrupted, run it again: it
     resumes.
