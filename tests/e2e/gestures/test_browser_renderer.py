@@ -64,7 +64,7 @@ def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[tupl
 
 def settled(editor: Editor) -> Pixels:
     """The picture once it has stopped changing."""
-    expect(editor.page.locator("footer.status")).to_contain_text("Approximate while the camera moves", timeout=WAIT_MS)
+    expect(editor.page.locator("footer.status")).to_contain_text("Refining", timeout=WAIT_MS)
     editor.page.evaluate(WAIT_FOR_FRAMES)  # what was done has become an edit
     editor.page.wait_for_function("() => window.relumeStats.waiting.length === 0", timeout=DRAWN_MS)
     whole = editor.page.get_by_text("Approximate while moving")  # else it says that it previews

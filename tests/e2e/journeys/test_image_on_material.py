@@ -162,7 +162,7 @@ def test_images_that_are_dropped_together_are_one_step(
 
 def test_what_cannot_be_taken_is_named_until_the_next_drop(editor: Editor, stripes: Path) -> None:
     page = editor.page
-    for name, words in (("cayman.brdf", "drop measured materials on the Library"), ("car.glb", "on the start page")):
+    for name, words in (("cayman.brdf", "give a .binary, .bsdf or .brdf"), ("car.glb", "on the start page")):
         drop_on_the_middle(editor, {name: stripes}, "")
         expect(page.locator(".toast.error")).to_have_count(1)  # that before is gone
         expect(page.locator(".toast.error")).to_contain_text(name)
