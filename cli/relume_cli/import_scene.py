@@ -59,6 +59,10 @@ def import_scene(
     from relume_worker.scenes import get_scene, register_scene
 
     given = {key: value for key, value in (("up", up), ("unit", unit), ("recenter", recenter)) if value is not None}
+    if built_in is not None and given:
+        from relume.core.errors import ParameterError
+
+        raise ParameterError("--built-in", built_in, "it without --up, --unit and --recenter")
     service = open_bakes(open_settings(data))
     try:
         options = None if built_in or file is None else _options(service.ledger, name or file.stem, given)

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from relume.patches.importons import lobe_directions
 from relume.raytrace.barycentric import positions_on_faces
-from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
+from relume.raytrace.camera_rays import Hits, camera_directions, near_distances, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera
 
@@ -74,6 +74,7 @@ def _trace_from_camera(geometry: SceneBuffers, normals: F32, camera: Camera, out
     width, height = _CAMERA_PIXELS
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, _CAMERA_PIXELS, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    hits = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    position, start = camera.to_world[:3, 3].astype(np.float32), near_distances(camera, directions)
+    hits = trace_rays(geometry.embree, position, directions, start=start)
     sides = _hit_sides(normals, hits, directions, outside)
     return np.stack([np.full(len(sides), outside), sides])

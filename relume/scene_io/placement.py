@@ -11,8 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored
-from relume.scene.finalize import sort_warnings
+from relume.core.import_warnings import SEVERITIES, ImporterWarning, approximated, ignored
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 from relume.scene_io.gltf.cameras import framing_camera
@@ -45,7 +44,8 @@ def place(scene: Scene, options: ImportOptions) -> Scene:
     low, high = bounds(scene)
     rotation = TO_Y_UP[options.up]
     meters = _guess_unit(high - low, warnings) if options.unit == "auto" else METERS[options.unit]
-    origin = choose_origin(low, high, options.recenter)
+    has_moved = any(scene.offset)  # by a reader, before rounding
+    origin = np.zeros(3) if has_moved else choose_origin(low, high, options.recenter)
     if np.array_equal(rotation, np.eye(3)) and meters == 1 and not origin.any() and not warnings:
         return replace(scene, import_options=options.document())
     if meters * float(np.maximum(np.abs(low - origin), np.abs(high - origin)).max()) > MAX_COORDINATE:
@@ -62,7 +62,7 @@ def place(scene: Scene, options: ImportOptions) -> Scene:
         [_place_material(material, meters) for material in scene.materials],
         [framing_camera(meshes, scene.cameras[0].name)] if has_view else cameras,
         scene.environment,
-        sort_warnings([*scene.warnings, *warnings]),
+        sorted([*warnings, *scene.warnings], key=lambda warning: SEVERITIES.index(warning.severity)),
         {name: _place_look(look, meters) for name, look in scene.variants.items()},
         [_place_light(light, rotation, meters, origin) for light in scene.lights],
         (float(offset[0]), float(offset[1]), float(offset[2])),
@@ -161,5 +161,5 @@ def moved_warning(origin: Shaped[F64, " 3"]) -> list[ImporterWarning]:
     if not origin.any():
         return []
     x, y, z = (f"{value:,.10g}" for value in origin)
-    message = f"Positions are relative to ({x}; {y}; {z}) of the file: the middle of the scene, which is far from zero."
+    message = f"Positions are relative to ({x}; {y}; {z}) of the file: the middle of the scene."
     return [ignored(message)]

@@ -21,7 +21,7 @@ def memory_bytes(size: tuple[int, int], directions: int, clusters: int, componen
         directions, clusters, components: numbers of them, see `LocalPcaBtf`.
     """
     texels = directions * (4 * size[0] * size[1] // 3) * (1 + components + _FREE_CAMERA_BYTES)
-    tables = directions**2 * clusters * (1 + components) * _CHANNELS * _FLOAT_BYTES
+    tables = directions**2 * clusters * (1 + components) * _CHANNELS * (_FLOAT_BYTES + 1)  # and as stored
     return texels + tables
 
 

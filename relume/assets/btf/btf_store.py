@@ -286,6 +286,8 @@ def _is_consistent(btf: LocalPcaBtf) -> bool:
         (height > 0).all()
         and (width > 0).all()
         and height[0] * width[0] <= MAX_TEXELS
+        and (height[1:] == np.maximum(height[:-1] // 2, 1)).all()
+        and (width[1:] == np.maximum(width[:-1] // 2, 1)).all()
         and (first == ends).all()
         and btf.cluster.shape == (directions, texels)
         and int(btf.cluster.max()) < clusters

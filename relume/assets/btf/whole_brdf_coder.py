@@ -18,6 +18,7 @@ then trade the same error for a bit, and entropy coding makes rare large ones ch
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -54,7 +55,7 @@ _HIDDEN_RIDGE = 1e-3  # of the least squares of texels that some views hide, of 
 _RIDGE = 1e-5  # of the least squares of tables and of coarse texels, relative to each unknown's energy
 _BLOCK = 2048  # texels solved at once
 _STEPS = 40  # of the bisection for δ
-_BITS_OF_NOISE = 2 * np.pi * np.e  # entropy of a rounded Gaussian: ½ log₂(1 + 2πe σ²)
+_BITS_OF_NOISE = 2 * math.pi * math.e  # entropy of a rounded Gaussian: ½ log₂(1 + 2πe σ²)
 
 
 class WholeBrdfs(NamedTuple):

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.raytrace.alpha_filter import IGNORE_GLASS
-from relume.raytrace.camera_rays import trace_rays
+from relume.raytrace.camera_rays import near_distances, trace_rays
 from relume.scene.model import Camera
 
 F64 = NDArray[np.float64]
@@ -32,7 +32,7 @@ def pivot_of(transfer: FreeCameraTransfer, camera: Camera) -> Shaped[F64, " 3"]:
     """
     position, forward, stored_scene = camera.to_world[:3, 3], -camera.to_world[:3, 2], transfer.stored_scene
     ray = position.astype(np.float32), forward[None].astype(np.float32)
-    face = int(trace_rays(transfer.embree, *ray, IGNORE_GLASS).face[0])
+    face = int(trace_rays(transfer.embree, *ray, IGNORE_GLASS, start=near_distances(camera, ray[1])).face[0])
     bounds = next(iter(transfer.views.values())).bounds
     if face >= 0:
         has_same_material = stored_scene.face_material == stored_scene.face_material[face]

@@ -90,6 +90,7 @@ class ProgressivePicture:
             self._static_picture, self._is_static = None, False
         self._look, self._active_pointer, self._solo = look, active_pointer, solo
         self._look_seq += 1
+        self._moving_error = None
 
     def set_camera(self, camera: Camera, size: tuple[int, int], *, is_idle: bool = True) -> None:
         """Set the camera; nothing is computed yet.
@@ -142,20 +143,22 @@ class ProgressivePicture:
         unwatched = self._free_camera_picture.unwatched()
         if self._corrected_for != request and should_correct(self._look):
             return correction_job(view_state, unwatched, request, partial(self._correct, request))
-        return static_view_job(view_state, unwatched, request, partial(self._set_static_picture, self._camera_seq))
+        unwatched.renders_pixels = self.renders_pixels  # the error is of what was shown
+        return static_view_job(view_state, unwatched, request, partial(self._set_static_picture, request))
 
     def _correct(self, request: tuple[int, int], residual_image: F32 | None) -> None:
         if request == (self._camera_seq, self._look_seq):  # else the camera or the look has changed
             self._corrected_for = request
             self._free_camera_picture.correct(residual_image)
 
-    def _set_static_picture(self, camera_seq: int, has_indirect: bool, result: ExactImage | None) -> None:
-        if camera_seq != self._camera_seq or self._look is None:
+    def _set_static_picture(self, request: tuple[int, int], has_indirect: bool, result: ExactImage | None) -> None:
+        if request[0] != self._camera_seq or self._look is None:
             return
         if result is None:
             self._is_idle = False
             return
-        static_picture, self._moving_error = result
+        static_picture = result.picture
+        self._moving_error = result.error if request[1] == self._look_seq else None
         if _has_indirect(self._look) and not has_indirect:  # requested meanwhile; the next job reuses the traced view
             return
         static_picture.set_look(self._look, active_pointer=self._active_pointer, solo=self._solo)

@@ -184,8 +184,13 @@ def static_view_job(
             raise
         except RelumeError as error:  # the scene is gone, or it needs more memory than there is
             return ResultUnavailableError(f"{label} is not available: {error}")
-        free_camera_picture.set_look(view_state.look, solo=view_state.solo)
-        image, gbuffer = free_camera_picture.render_moving()
+        if is_canceled():
+            raise CancelledError("the exact image was canceled")
+        try:
+            free_camera_picture.set_look(view_state.look, solo=view_state.solo)
+            image, gbuffer = free_camera_picture.render_moving()
+        except RelumeError:  # the image is exact without knowing the error of the other
+            return ExactImage(picture, None)
         return ExactImage(picture, pixel_errors(image, picture.image(), gbuffer, view_state.look.display).sum())
 
     def apply_result(result: ExactImage | ResultUnavailableError) -> None:

@@ -182,9 +182,13 @@ class BakedFreeCamera:
         bounds = next(iter(self.views.values())).bounds
         return interior_camera(self.embree, self.stored_scene.face_normal, bounds, "inside")
 
+    @cached_property
+    def _ray_epsilon(self) -> float:
+        return float(ray_epsilon(self.positions))
+
     def first_obstacle(self, path: Shaped[NDArray[np.float64], "points 3"]) -> Obstacle | None:
         """Find the first surface on a path. path: corners of a polyline, meters"""
-        return first_obstacle(self.embree, path, ray_epsilon(self.positions))
+        return first_obstacle(self.embree, path, self._ray_epsilon)
 
     def surroundings(self, position: Shaped[NDArray[np.float64], " 3"]) -> Surroundings:
         """Find the surfaces around a point. position: meters"""

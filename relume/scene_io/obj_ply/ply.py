@@ -89,6 +89,7 @@ def read_ply(data: bytes, warnings: list[ImporterWarning]) -> Ply:
         raise SceneError("the .ply file has no faces; make a mesh of the points and export it again")
     _warn_truncated(elements, read, warnings)
     lengths, vertices = faces if isinstance(faces, tuple) else (np.zeros(0, np.int64), np.zeros(0))
+    face = face if isinstance(faces, tuple) else {}  # without corners, its columns belong to no polygon
     vertices = whole_numbers(vertices)
     strip_vertices = np.zeros((0, 3), np.int64) if strips is None else unroll_strips(strips)
     positions, normals = _columns(vertex, ("x", "y", "z")), _columns(vertex, ("nx", "ny", "nz"))

@@ -12,7 +12,7 @@ from relume.scene.model import Camera
 from relume_server.schemas.base import Body, Name
 
 MAX_PATH_POINTS = 64
-PathCoordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+PathCoordinate = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 PathPoint = tuple[PathCoordinate, PathCoordinate, PathCoordinate]
 ViewportSide = Annotated[int, Field(ge=16, le=1024)]
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
+from fastapi.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from relume.core.errors import RelumeError
@@ -96,7 +97,8 @@ async def serve(
     services.metrics.sessions.inc()
     is_for_good = False
     try:
-        await state.socket.send(_hello(session, bake, state, token, saved is not None))
+        hello = await run_in_threadpool(_hello, session, bake, state, token, saved is not None)  # may trace rays
+        await state.socket.send(hello)
         await _run(services, websocket, bake, state)
     except WebSocketDisconnect as gone:
         is_for_good = gone.code == CLOSE_NORMAL

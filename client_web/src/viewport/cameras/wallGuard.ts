@@ -107,7 +107,7 @@ export class WallGuard {
       const way = waypointsOf([from, ...step.map(({ orbit }) => orbit)]);
       const obstacle = await this.trace(way);
       if (this.waiting[0] !== step[0]) continue; // canceled meanwhile
-      if (obstacle?.length != null) this.halt(way, obstacle, (step.at(-1) as { slides: boolean }).slides);
+      if (obstacle?.length != null) this.halt(way, obstacle, step.some(({ slides }) => slides));
       else {
         this.waiting.splice(0, count);
         this.guarded.accept((way.at(-1) as Waypoint).orbit);
@@ -133,10 +133,12 @@ export class WallGuard {
     const towards = normal === null ? 1 : Math.abs(dot(direction, normal));
     const stopped = poseAfter(way, Math.max(0, (traveled as number) - this.margin / Math.max(MIN_COSINE, towards)));
     const rest = subtract(points.at(-1) as Triple, positionOf(stopped));
+    const goal = this.goal; // what was turned meanwhile stays
+    const held = slides ? translateOrbit(goal, subtract(positionOf(stopped), positionOf(goal))) : stopped;
     this.cancel();
-    this.guarded.accept(stopped);
+    this.guarded.accept(held);
     const along = normal === null ? rest : subtract(rest, scale(normal, dot(rest, normal)));
-    if (slides && length(along) > MIN_SLIDE * length(rest)) this.move(translateOrbit(stopped, along));
+    if (slides && length(along) > MIN_SLIDE * length(rest)) this.move(translateOrbit(held, along));
     else this.guarded.stop({ material: material ?? "", direction });
   }
 }

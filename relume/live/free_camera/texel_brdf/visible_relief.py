@@ -85,7 +85,10 @@ def see_relief(pca_btf: LocalPcaBtf, levels: Shaped[NDArray[np.int32], "levels 3
     mip_levels = build_mip_levels(np.ascontiguousarray(heights.reshape(num_views, -1).T), size)
     steps = np.concatenate([level.reshape(-1, num_views) for level in mip_levels]).T - lowest
     stored_levels = np.ascontiguousarray(levels[skip:] - [levels[skip, 0], 0, 0], np.int32)
-    height, max_slope = np.rint(steps / step).astype(np.uint8), np.float32(np.linalg.norm(shear, axis=1).max())
+    height, max_slope = (
+        np.rint(steps / step).clip(0, 255).astype(np.uint8),
+        np.float32(np.linalg.norm(shear, axis=1).max()),
+    )
     return VisibleRelief(stored_levels, skip, np.ascontiguousarray(height), lowest, step, shear, max_slope)
 
 
