@@ -107,7 +107,12 @@ export class WallGuard {
       const way = waypointsOf([from, ...step.map(({ orbit }) => orbit)]);
       const obstacle = await this.trace(way);
       if (this.waiting[0] !== step[0]) continue; // canceled meanwhile
-      if (obstacle?.length != null) this.halt(way, obstacle, step.some(({ slides }) => slides));
+      if (obstacle?.length != null)
+        this.halt(
+          way,
+          obstacle,
+          step.some(({ slides }) => slides),
+        );
       else {
         this.waiting.splice(0, count);
         this.guarded.accept((way.at(-1) as Waypoint).orbit);
