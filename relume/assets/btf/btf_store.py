@@ -40,6 +40,11 @@ _TYPES = {
 }  # fmt: skip
 _MAX_STORED_BYTES = 4 << 30  # of all arrays, not deflated
 _MAX_LEVELS_BYTES = 4096
+# what NumPy and zipfile raise for damaged archives: headers that claim too much, foreign members, unknown methods
+_DAMAGES = (
+    OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError, MemoryError, RuntimeError,
+    BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -151,7 +156,7 @@ def load_shape(data: str) -> tuple[tuple[int, int], int, int, int]:
             levels = _array(path, "levels")
             directions, clusters, components = _array(path, "eigen").shape[:3]
         _, height, width = levels[0]
-    except (OSError, ValueError, KeyError, IndexError, EOFError, BadZipFile, zlib.error) as problem:
+    except _DAMAGES as problem:
         raise STORE.damaged_error(path) from problem
     return (int(height), int(width)), directions, clusters, components
 
@@ -182,7 +187,7 @@ def _load(path: Path) -> LocalPcaBtf:
             if (path / _ARRAYS_FILE).exists()
             else _load_packed(path, document, grid, error)
         )
-    except (OSError, ValueError, KeyError, TypeError, IndexError, EOFError, BadZipFile, zlib.error) as problem:
+    except _DAMAGES as problem:
         raise STORE.damaged_error(path) from problem
     if not _is_consistent(btf):
         raise STORE.damaged_error(path)
