@@ -172,6 +172,7 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
     expect(page.get_by_role("button", name="90×160, free camera")).to_be_visible()
     there = settled(moving)
     menu.get_by_role("button", name="Save this camera").click()
+    page.wait_for_function("() => document.activeElement?.matches('input:not([type=range]):not([type=number])')")
     page.keyboard.type("Near")  # its name is open for typing
     page.keyboard.press("Enter")
     expect(menu.get_by_role("button", name="Rename Near")).to_be_visible()
