@@ -4,15 +4,14 @@ import { MAX_CAMERA_PIXELS, type CameraEntry } from "../../protocol";
 import { activeView } from "../../state/views";
 import { IconButton } from "../../ui/IconButton";
 import { EditableName } from "../../ui/EditableName";
-import { LabeledSlider } from "../../ui/LabeledSlider";
 import { NumberField } from "../../ui/NumberField";
 import { reportErrors } from "../../ui/toasts";
 import { useDismiss } from "../../ui/useDismiss";
 import { nextCameraName, listCameras, MAX_NAME } from "./cameraRequests";
 import { moveFreeCamera, type FreeCamera } from "./freeCamera";
 import { saveCameraAs, removeCamera } from "./savedCameras";
-import { setStopsAtWalls, stopsAtWalls } from "./navigation";
-import { diagonalOf, levelOrbit, MAX_YFOV, MIN_YFOV, withFieldOfView, withNearPlane } from "./orbit";
+import { LensSliders, StopAtWalls } from "./LensFields";
+import { levelOrbit } from "./orbit";
 
 const MIN_SIDE = 16;
 const MAX_SIDE = 4096;
@@ -113,34 +112,12 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
       </button>
       {open && (
         <div class="menu-body camera-menu" role="dialog" aria-label="Camera options">
-          <LabeledSlider
-            label="Field of view"
-            unit="°"
-            title="Vertical"
-            value={freeCamera.orbit.yfov}
-            minimum={MIN_YFOV}
-            maximum={MAX_YFOV}
-            scale="log"
-            onChange={(yfov) => freeCamera.change((now) => withFieldOfView(now, yfov))}
+          <LensSliders
+            orbit={freeCamera.orbit}
+            bounds={freeCamera.bounds}
+            change={(update) => freeCamera.change(update)}
           />
-          <LabeledSlider
-            label="Clip near"
-            unit="m"
-            title="Hide surfaces nearer than this, as a wall in front of a room. Light and shadows stay."
-            value={freeCamera.orbit.near}
-            minimum={0}
-            maximum={Number(diagonalOf(freeCamera.bounds).toPrecision(3))}
-            scale="linear"
-            onChange={(near) => freeCamera.change((now) => withNearPlane(now, near))}
-          />
-          <label title="The camera stops at surfaces, unless you step through (J)">
-            <input
-              type="checkbox"
-              checked={stopsAtWalls.value}
-              onChange={(event) => setStopsAtWalls(event.currentTarget.checked)}
-            />
-            Stop at walls
-          </label>
+          <StopAtWalls title="The camera stops at surfaces, unless you step through (J)" />
           {Math.abs(freeCamera.orbit.roll) > UPRIGHT && (
             <button title="Remove the camera's roll" onClick={() => freeCamera.change(levelOrbit)}>
               Level horizon

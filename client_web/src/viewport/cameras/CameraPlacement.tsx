@@ -3,7 +3,6 @@ import { useEffect, useId, useRef, useState } from "preact/hooks";
 import type { SceneBody, Triple } from "../../protocol";
 import type { BakeSize } from "../../session/scene/recipe";
 import { IconButton } from "../../ui/IconButton";
-import { LabeledSlider } from "../../ui/LabeledSlider";
 import {
   getPlacementView,
   listCameras,
@@ -15,21 +14,11 @@ import {
 } from "./cameraRequests";
 import { saveCameraAs } from "./savedCameras";
 import { CameraMotion } from "./cameraMotion";
-import {
-  poseOf,
-  MAX_YFOV,
-  MIN_YFOV,
-  orbitOf,
-  diagonalOf,
-  withFieldOfView,
-  withNearPlane,
-  type Bounds,
-  type CameraPose,
-  type Orbit,
-} from "./orbit";
+import { poseOf, orbitOf, type Bounds, type CameraPose, type Orbit } from "./orbit";
+import { LensSliders, StopAtWalls } from "./LensFields";
 import { PlacementImages } from "./placementImages";
 import { CAMERA_STEPS, NAVIGATION_HELP, NAVIGATION_LABELS } from "./cameraSteps";
-import { navigation, setStopsAtWalls, stopsAtWalls, toggleNavigation, wallMargin } from "./navigation";
+import { navigation, stopsAtWalls, toggleNavigation, wallMargin } from "./navigation";
 import { cameraKeyStep, useCameraControl } from "./useCameraControl";
 import { Walker } from "./walker";
 import { WallGuard } from "./wallGuard";
@@ -265,35 +254,9 @@ function PlacementView({ scene, bounds, first, overview, interior, name, onSave 
             Inside
           </button>
         )}
-        <label title="The camera stops at surfaces">
-          <input
-            type="checkbox"
-            checked={stopsAtWalls.value}
-            onChange={(event) => setStopsAtWalls(event.currentTarget.checked)}
-          />
-          Stop at walls
-        </label>
+        <StopAtWalls title="The camera stops at surfaces" />
       </div>
-      <LabeledSlider
-        label="Field of view"
-        unit="°"
-        title="Vertical"
-        value={orbit.yfov}
-        minimum={MIN_YFOV}
-        maximum={MAX_YFOV}
-        scale="log"
-        onChange={(yfov) => change((now) => withFieldOfView(now, yfov))}
-      />
-      <LabeledSlider
-        label="Clip near"
-        unit="m"
-        title="Hide surfaces nearer than this. Light and shadows stay."
-        value={orbit.near}
-        minimum={0}
-        maximum={Number(diagonalOf(bounds).toPrecision(3))}
-        scale="linear"
-        onChange={(near) => change((now) => withNearPlane(now, near))}
-      />
+      <LensSliders orbit={orbit} bounds={bounds} change={change} />
       <div class="placement-keep">
         <label for={field}>Name</label>
         <input
