@@ -19,10 +19,9 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from relume.assets.btf.compress import Coders
 from relume.assets.btf.local_pca_btf import LocalPcaBtf
@@ -31,6 +30,7 @@ from relume.assets.btf.stored_arrays import stored_bytes
 from relume.assets.btf.value_cache import ValueFile
 from relume.core.color import srgb_encode
 from relume.core.memory_usage import live_bytes
+from relume.image_io.color_difference import to_lab
 from relume.synthetic_btf.synthesize import GEOMETRIES
 from relume_bench.btf_flat import FLAT_MATERIALS
 from relume_bench.btf_synthetic import SyntheticBtf, compression_texels, open_values_folder
@@ -40,7 +40,6 @@ _AT_RATIO, _AT_ERROR = 50.0, 0.05
 _LEAST_BOUND, _MOST_BOUND = 0.005, 0.5
 _TRIALS = 4  # compressions per coder; each halves the interval of bounds, as a ratio
 _SOME_TEXELS = 200
-_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])  # ITU-R BT.709-6
 
 
 class _Compression(NamedTuple):
@@ -127,7 +126,8 @@ def _describe(values: ValueFile, compressed: LocalPcaBtf, ratio: float, ideal: f
     exact = np.stack([values.get_view(view)[:, texels] for view in range(len(decoded))])
     encoded, exact_encoded = (np.rint(255 * srgb_encode(np.clip(np.pi * each, 0, 1))) for each in (decoded, exact))
     srgb = float(np.sqrt(np.mean((encoded - exact_encoded) ** 2)) / 255)
-    delta_e = float(np.linalg.norm(_to_lab(decoded) - _to_lab(exact), axis=-1).mean())
+    labs = [to_lab(np.pi * np.maximum(each, 0).astype(np.float64)) for each in (decoded, exact)]  # white is matte
+    delta_e = float(np.linalg.norm(np.subtract(*labs), axis=-1).mean())
     return _Compression(
         error,
         {
@@ -156,12 +156,3 @@ def _estimate_energy_bound(values: ValueFile) -> float:
     residual = np.array([np.minimum(variance, threshold).sum() for threshold in level])
     target_bits = 8 * 3 * values.grid.num_directions**2 / _AT_RATIO  # bits of all views per texel
     return float(np.sqrt(np.interp(target_bits, bits[::-1], residual[::-1]) / energy))
-
-
-def _to_lab(values: NDArray[Any]) -> NDArray[np.float64]:
-    """CIE L*a*b* of linear Rec. 709 radiance; white is a matte white surface. (..., 3)"""
-    relative_xyz = np.pi * np.maximum(values, 0).astype(np.float64) @ (_TO_XYZ / _TO_XYZ.sum(axis=1, keepdims=True)).T
-    x, y, z = np.moveaxis(
-        np.where(relative_xyz > 216 / 24389, np.cbrt(relative_xyz), relative_xyz * 841 / 108 + 4 / 29), -1, 0
-    )
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
+from relume.core.color import luminance
 from relume.live.free_camera.image_error import pixel_errors
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.openers import open_bake
@@ -58,7 +59,6 @@ _NUM_FILES = 10
 _MAX_ALBEDO, _MIN_ROUGHNESS = 0.8, 0.5
 _BLOT, _BLACK = 3.0, 0.01
 _DIFFUSE = ("lambert", "oren_nayar")
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class FreeCameraSizes(NamedTuple):
@@ -86,7 +86,7 @@ def measure(tiny: bool) -> list[Figure]:
     sizes = FreeCameraSizes.choose(tiny)
     images: dict[str, dict[str, float]] = {}
     failures: dict[str, str] = {}
-    for name, scene in _scenes(sizes):
+    for name, scene in free_camera_scenes(sizes):
         try:
             images |= {f"{name}, {camera.name}": errors for camera, errors in _measure_scene(scene, sizes)}
         except Exception as error:  # the other scenes must still be measured
@@ -119,8 +119,8 @@ def summarize(
     ]
 
 
-def _scenes(sizes: FreeCameraSizes) -> Iterator[tuple[str, Scene]]:
-    """Names and scenes; files are in both environments in turn."""
+def free_camera_scenes(sizes: FreeCameraSizes) -> Iterator[tuple[str, Scene]]:
+    """Names and scenes: built-in ones, then files, in both environments in turn. sizes: numbers of both"""
     for name in list(BUILT_IN)[: sizes.built_in]:
         yield name, built_in(name)
     files = list(asset_files(shared_data()))
@@ -223,7 +223,7 @@ def count_blots(radiance: NDArray[np.floating], exact: NDArray[np.floating]) -> 
     Args:
         radiance, exact: linear radiance of pixels. (n, 3)
     """
-    luminance, exact_luminance = (values @ _LUMINANCE for values in (radiance, exact))
-    black = _BLACK * exact_luminance.mean()
-    ratio = (luminance + black) / (exact_luminance + black)
+    ours, reference = (luminance(values.astype(np.float64)) for values in (radiance, exact))
+    black = _BLACK * reference.mean()
+    ratio = (ours + black) / (reference + black)
     return int(((ratio > _BLOT) | (ratio < 1 / _BLOT)).sum())

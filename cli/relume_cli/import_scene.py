@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from relume.core.import_warnings import SEVERITIES
+from relume.core.import_warnings import by_severity
 from relume.scene_io.import_options import Recenter, Unit, UpAxis
 from relume_cli.options import Data, check_readable
 from relume_cli.terminal.printing import Json, note, print_result
@@ -74,7 +74,7 @@ def import_scene(
         service.close()
     document = scene_document(record, bakes) | _content_document(scene)
     print_result(document, record.id, as_json=as_json, details=_summary_lines(scene))
-    for warning in sorted(record.warnings, key=lambda warning: SEVERITIES.index(warning.severity)):
+    for warning in by_severity(record.warnings):
         typer.echo(f"warning, {warning.severity}: {warning}", err=True)
 
 

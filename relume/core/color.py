@@ -10,6 +10,15 @@ F32 = NDArray[np.float32]
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Y of linear Rec. 709 red, green and blue (ITU-R BT.709-6)."""
 
+TO_XYZ = np.array(
+    [
+        [0.4123907993, 0.3575843394, 0.1804807884],
+        [0.2126390059, 0.7151686788, 0.0721923154],
+        [0.0193308187, 0.1191947798, 0.9505321522],
+    ]
+)
+"""CIE 1931 XYZ of linear Rec. 709; white is D65 (IEC 61966-2-1)."""
+
 
 def luminance(rgb: Shaped[F32, "*batch 3"]) -> F32:
     """Luminance Y of linear Rec. 709 RGB, for each pixel."""

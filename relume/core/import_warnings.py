@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Any, Literal, get_args
 
 Severity = Literal["unsupported", "approximated", "ignored"]
@@ -53,6 +54,11 @@ class ImporterWarning(str):
     def document(self) -> dict[str, str]:
         """Convert to JSON."""
         return {"text": str(self), "severity": self.severity, "where": self.location}
+
+
+def by_severity(warnings: Iterable[ImporterWarning]) -> list[ImporterWarning]:
+    """Sort warnings, the most severe first."""
+    return sorted(warnings, key=lambda warning: SEVERITIES.index(warning.severity))
 
 
 def unsupported(sentence: str) -> ImporterWarning:

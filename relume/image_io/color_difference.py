@@ -10,17 +10,12 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.color import TO_XYZ, srgb_decode
+
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_TO_XYZ = np.array(
-    [
-        [0.4123907993, 0.3575843394, 0.1804807884],
-        [0.2126390059, 0.7151686788, 0.0721923154],
-        [0.0193308187, 0.1191947798, 0.9505321522],
-    ]
-)
-_WHITE = _TO_XYZ.sum(axis=1)
+_WHITE = TO_XYZ.sum(axis=1)
 _25_POW_7 = 25.0**7
 
 
@@ -32,14 +27,13 @@ def color_difference(
     Args:
         first, second: sRGB display values in [0, 1].
     """
-    return ciede2000(_lab(first), _lab(second))
+    linear = (np.asarray(srgb_decode(np.asarray(display, np.float64)), np.float64) for display in (first, second))
+    return ciede2000(*map(to_lab, linear))
 
 
-def _lab(display: F32) -> F64:
-    """CIELAB for the white of sRGB. (..., 3)"""
-    encoded = np.asarray(display, np.float64)
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    ratio = linear @ _TO_XYZ.T / _WHITE
+def to_lab(linear: Shaped[F64, "*shape 3"]) -> Shaped[F64, "*shape 3"]:
+    """CIELAB of linear Rec. 709, not negative; white is (1, 1, 1)."""
+    ratio = linear @ TO_XYZ.T / _WHITE
     delta = 6 / 29
     f = np.where(ratio > delta**3, np.cbrt(ratio), ratio / (3 * delta**2) + 4 / 29)
     x, y, z = np.moveaxis(f, -1, 0)

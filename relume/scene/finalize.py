@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from relume.assets.environments.environment import Environment
-from relume.core.import_warnings import SEVERITIES, ImporterWarning
+from relume.core.import_warnings import ImporterWarning, by_severity
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 
@@ -43,7 +43,7 @@ def finalize(
 
 def sort_warnings(warnings: Sequence[ImporterWarning]) -> list[ImporterWarning]:
     """Return at most `MAX_WARNINGS`, the most severe first, and one about the rest."""
-    sorted_warnings = sorted(warnings, key=lambda warning: SEVERITIES.index(warning.severity))
+    sorted_warnings = by_severity(warnings)
     if len(sorted_warnings) > MAX_WARNINGS:
         num_omitted = len(sorted_warnings) - MAX_WARNINGS
         more = ImporterWarning(f"… and {num_omitted:,} more.", sorted_warnings[MAX_WARNINGS - 1].severity)

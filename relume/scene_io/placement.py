@@ -11,7 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import SEVERITIES, ImporterWarning, approximated, ignored
+from relume.core.import_warnings import ImporterWarning, approximated, by_severity, ignored
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 from relume.scene_io.gltf.cameras import framing_camera
@@ -62,7 +62,7 @@ def place(scene: Scene, options: ImportOptions) -> Scene:
         [_place_material(material, meters) for material in scene.materials],
         [framing_camera(meshes, scene.cameras[0].name)] if has_view else cameras,
         scene.environment,
-        sorted([*warnings, *scene.warnings], key=lambda warning: SEVERITIES.index(warning.severity)),
+        by_severity([*warnings, *scene.warnings]),
         {name: _place_look(look, meters) for name, look in scene.variants.items()},
         [_place_light(light, rotation, meters, origin) for light in scene.lights],
         (float(offset[0]), float(offset[1]), float(offset[2])),

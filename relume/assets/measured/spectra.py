@@ -8,14 +8,12 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.color import TO_XYZ
+
 F64 = NDArray[np.float64]
 
 _TABLE = Path(__file__).with_name("cie_1931_d65.csv")  # every 10 nm: color matching functions x, y, z, and D65
 _STEP_NM = 1.0
-# IEC 61966-2-1
-_XYZ_TO_REC709 = np.array(
-    [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
-)
 
 
 def rec709_weights(wavelengths: Shaped[F64, " n"]) -> Shaped[F64, "n 3"]:
@@ -31,5 +29,5 @@ def rec709_weights(wavelengths: Shaped[F64, " n"]) -> Shaped[F64, "n 3"]:
     fine = np.arange(nanometers[0], nanometers[-1] + _STEP_NM / 2, _STEP_NM)
     xyz = np.stack([np.interp(fine, nanometers, curve * illuminant) for curve in (x, y, z)], axis=-1)
     hats = np.stack([np.interp(fine, wavelengths, hat) for hat in np.eye(len(wavelengths))])
-    weights = hats @ xyz @ _XYZ_TO_REC709.T
+    weights = hats @ xyz @ np.linalg.inv(TO_XYZ).T
     return np.asarray(weights / weights.sum(axis=0))

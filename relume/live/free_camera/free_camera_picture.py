@@ -52,7 +52,6 @@ from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
 from relume.look.glass import GlassOfLook, glass_of
 from relume.math.zernike import degree_of
-from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
 from relume.views.resolve import encode_coverage, encode_pixels
@@ -383,44 +382,22 @@ class FreeCameraPicture:
         """The G-buffer of its rays."""
         return self._current_gbuffer()
 
-    def render_pixel_centers(
-        self, size: tuple[int, int], *, is_fine: bool = True
-    ) -> tuple[Shaped[F32, "height width 3"], GBuffer]:
-        """Render the look along rays through the pixel centers of an image of another size.
-
-        Args:
-            size: width and height in pixels. is_fine: with the highlights of a stopped camera.
-        Returns:
-            Linear radiance, float32, and the G-buffer.
-        """
-        assert self._look is not None
-        gbuffer = self._trace_gbuffer(size).pixel_centers(size[0] * size[1])
-        state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=is_fine)
-        args = self._transfer.occlusion_mesh, gbuffer, self._camera, size
-        shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
-        return render_frame(self._transfer, state, gbuffer, self._camera, size, shadow_visibility).image, gbuffer
-
-    def render_moving(self) -> tuple[Shaped[F32, "height width 3"], GBuffer]:
+    def render_moving(self, *, only_centers: bool = False) -> tuple[Shaped[F32, "height width 3"], GBuffer]:
         """Render the image of a moving camera anew: without fine highlights, and without a residual.
 
+        Args:
+            only_centers: one ray for each pixel, and none behind glass.
         Returns:
             Linear radiance, float32, and the G-buffer.
         """
         assert self._look is not None
         gbuffer = self._current_gbuffer()
+        if only_centers:
+            gbuffer = gbuffer.pixel_centers(self._size[0] * self._size[1])
         state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=False)
-        shadow_visibility = self._trace_shadow_visibility(state.incident.hard_shadow_lights, gbuffer)
+        args = self._transfer.occlusion_mesh, gbuffer, self._camera, self._size
+        shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
         return render_frame(self._transfer, state, gbuffer, self._camera, self._size, shadow_visibility).image, gbuffer
-
-    @property
-    def stored_scene(self) -> StoredScene:
-        """The scene."""
-        return self._transfer.stored_scene
-
-    @property
-    def material_names(self) -> Sequence[str]:
-        """Material names in the scene's order."""
-        return self._transfer.material_names
 
     def _current_light(self) -> Illumination:
         assert self._light is not None

@@ -60,6 +60,10 @@ class GBuffer(NamedTuple):
         pixel = np.concatenate([np.arange(num_pixels, dtype=np.int32), self.owner])
         return np.concatenate([pixel, pixel[self.glass.ray]])
 
+    def pixels_behind_glass(self, num_pixels: int) -> Shaped[NDArray[np.int32], " glass_rays"]:
+        """Return the pixel of each ray that meets glass. num_pixels: number of pixels of the image"""
+        return self.pixel_of_ray(num_pixels)[len(self.directions) - len(self.glass.ray) :]
+
     def shows_surface(self, num_pixels: int) -> NDArray[np.bool_]:
         """Return whether the center of each pixel shows a surface or glass. num_pixels: number of pixels"""
         is_surface = self.hits.face[:num_pixels] >= 0

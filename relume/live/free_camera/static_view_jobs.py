@@ -127,11 +127,8 @@ def _direct_residual(
         return None
     picture.set_look(look, solo=view_state.solo)
     picture.advance(None)
-    residual, (height, width, _) = exact - picture.image(), exact.shape
-    gbuffer = picture.gbuffer
-    residual.reshape(-1, 3)[
-        gbuffer.pixel_of_ray(width * height)[len(gbuffer.directions) - len(gbuffer.glass.ray) :]
-    ] = 0
+    residual = exact - picture.image()
+    residual.reshape(-1, 3)[picture.gbuffer.pixels_behind_glass(residual.size // 3)] = 0
     return residual
 
 

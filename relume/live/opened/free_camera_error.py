@@ -87,7 +87,7 @@ def _block_sums(free_picture: FreeCameraPicture, view: StaticViewState) -> F64:
         free_picture: in the light of the view. view: the reference.
     """
     free_picture.set_camera(*view.sized_camera)
-    image, gbuffer = free_picture.render_pixel_centers(view.sized_camera[1], is_fine=False)
+    image, gbuffer = free_picture.render_moving(only_centers=True)
     exact = view.static_picture(lambda share: None, lambda: False, smooths_edges=False).image()
     width, height = view.sized_camera[1]
     errors = np.stack(pixel_errors(image, exact, gbuffer, view.look.display))

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.color import luminance
 from relume.core.errors import SceneError
 from relume.core.import_warnings import UNREADABLE, ImporterWarning, approximated, ignored, quote, unsupported
 from relume.image_io.decode import U8, Decoder
@@ -25,7 +26,6 @@ from relume.scene_io.referenced_files import Companions
 F64 = NDArray[np.float64]
 MAX_STRENGTH = 100.0
 HARMLESS_MAPS = {"map_Ka", "map_aat"}  # ambient light, and antialiasing of textures
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 TEXTURES = (("map_Kd", "diffuse"), ("map_Ks", "specular"), ("map_Ke", "emission"))
 
 
@@ -179,7 +179,7 @@ class _Images:
             return None
         channel = self.mtl_material.maps[keyword].channel
         if channel == "l":
-            return np.asarray(np.round(pixels[..., :3] @ LUMINANCE), np.uint8)
+            return np.asarray(np.round(luminance(pixels[..., :3].astype(np.float64))), np.uint8)
         if not channel:  # a gray image, or the image of map_Kd with opacity in its alpha channel
             channel = "m" if keyword == "map_d" and np.ptp(pixels[..., 3]) else "r"
         return np.ascontiguousarray(pixels[..., "rgbm".index(channel)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 
+from relume.core.errors import count_text
 from relume.core.import_warnings import UNREADABLE, ImporterWarning, unsupported
 
 NAN_TEXT = re.compile(r"[+-]?(?:nan(?:\(\w*\))?|\d\.#\w*)", re.IGNORECASE)
@@ -51,7 +52,7 @@ def strip_comment(text: str) -> str:
 
 def counted(number: int, noun: str) -> str:
     """A number with its noun: "1 face", "2 faces"."""
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+    return count_text(number, noun, f"{noun}s")
 
 
 class Faults:
