@@ -39,9 +39,9 @@ def wait_until(holds: Callable[[], bool], else_words: str) -> None:
         time.sleep(0.1)
 
 
-def differs(editor: Editor, before: NDArray[np.int16], least: float = 0.02) -> None:
+def differs(editor: Editor, before: NDArray[np.int16], least: float = 0.02, after: str = "that") -> None:
     """Wait until the image has changed, and is the exact one of the stopped camera."""
-    wait_until(lambda: changed(before, editor.read_pixels()) >= least, "the picture stays as it was")
+    wait_until(lambda: changed(before, editor.read_pixels()) >= least, f"the picture stays as it was after: {after}")
     editor.wait_until_exact()
 
 
@@ -112,11 +112,11 @@ def test_every_gesture_moves_the_camera_twice(moving: Editor) -> None:
         "two fingers slide": lambda: fingers((-40, 0, 0, 20), (40, 0, 0, 20)),
         "two fingers spread": lambda: fingers((-40, 0, -10, 0), (40, 0, 10, 0)),
     }
-    for gesture in gestures.values():
+    for name, gesture in gestures.items():
         for _ in range(2):
             before = moving.read_pixels()
             gesture()
-            differs(moving, before)
+            differs(moving, before, after=name)
 
 
 def test_the_camera_is_reset_and_a_reload_keeps_it(moving: Editor) -> None:
