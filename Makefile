@@ -73,8 +73,8 @@ audit: $(AUDIT_TOOLS)/bin/pip-audit  ## known holes in the packages that the loc
 	cd client_web && npm audit
 
 lock: $(LOCK_TOOLS)/bin/uv  ## choose package versions again
-	@printf '$(BUILD_NEEDS)' | $(UV) --extra dev pyproject.toml - -o requirements.lock
-	@printf '$(BUILD_NEEDS)' | $(UV) --constraint requirements.lock pyproject.toml - -o docker/requirements.lock
+	@printf '$(BUILD_NEEDS)' | $(UV) --extra dev $(OPTIONAL) pyproject.toml - -o requirements.lock
+	@printf '$(BUILD_NEEDS)' | $(UV) --constraint requirements.lock $(OPTIONAL) pyproject.toml - -o docker/requirements.lock
 
 clean:  ## remove what make made; data and bakes stay
 	rm -rf $(VENV) client_web/node_modules client_web/dist build test-results
@@ -83,6 +83,8 @@ clean:  ## remove what make made; data and bakes stay
 
 # What `pip install -e .` builds with, so that nothing is fetched beside the lock.
 BUILD_NEEDS := hatchling>=1.27\neditables\n
+# Installed everywhere but by a bare `pip install`.
+OPTIONAL := --extra usd --extra materialx
 # Names, versions and hashes only: where packages come from is each machine's own setting.
 UV := $(LOCK_TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--no-annotate --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
