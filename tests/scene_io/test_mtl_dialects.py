@@ -265,3 +265,35 @@ def test_a_missing_map_is_a_named_error(tmp_path: Path, line: str, message: tupl
 def test_an_ambient_map_is_ignored(tmp_path: Path) -> None:
     (import_warning,) = scene_of(tmp_path, "newmtl M\nKd 1 1 1\nmap_Ka x.png\n").warnings
     assert import_warning.severity == "ignored"
+
+
+GLASS = "newmtl M\nKd 0.2 0.2 0.2\nKs 0.5 0.5 0.5\nTf 0.9 0.5 1\nNi 1.5\nd 1\nNs 300\nillum 7\n"
+
+
+def test_refracting_models_are_glass(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, GLASS)
+    material = scene.materials[0]
+    assert material.glass is not None
+    assert (material.glass.tint, material.glass.ior) == ((0.9, 0.5, 1.0), 1.5)
+    assert material.glass.thickness > 0  # refracts
+    assert material.glass.absorbed == (0, 0, 0)
+    assert params_of(material)["f0"] == pytest.approx([0.04] * 3)
+    diffuse = np.array(material.terms[0]["color"])  # what does not pass, below the reflection
+    np.testing.assert_allclose(diffuse / diffuse[1], [0.2, 1, 0], atol=1e-4)
+    assert scene.warnings == ("Illumination model 7 of material “M” was read as solid glass.",)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [
+        ("illum 7", "illum 2"),
+        ("Ni 1.5", "Ni 1"),
+        ("Tf 0.9 0.5 1", "Tf 0 0 0"),
+        ("\nd 1", "\nd 0.5"),
+        ("Ni 1.5", "Ni 9"),
+    ],
+)
+def test_surfaces_that_do_not_refract_are_no_glass(tmp_path: Path, written: str, instead: str) -> None:
+    material = material_of(tmp_path, GLASS.replace(written, instead))
+    assert material.glass is None
+    assert (material.opacity is not None) == ("0.5" in instead)

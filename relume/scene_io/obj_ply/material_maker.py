@@ -20,7 +20,15 @@ from relume.scene_io.gltf.document import TextureInfo
 from relume.scene_io.gltf.texture_resampling import NOISE
 from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
 from relume.scene_io.obj_ply.mtl import NORMAL_MAP_KEYWORDS, USED_MAPS
-from relume.scene_io.obj_ply.mtl_dialects import Gloss, MtlMap, MtlMaterial, gray_terms, make_mtl_terms
+from relume.scene_io.obj_ply.mtl_dialects import (
+    Gloss,
+    MtlMap,
+    MtlMaterial,
+    gray_terms,
+    make_glass,
+    make_glass_terms,
+    make_mtl_terms,
+)
 from relume.scene_io.referenced_files import Companions
 
 F64 = NDArray[np.float64]
@@ -57,6 +65,11 @@ class MaterialMaker:
         normal_map = self._normal_map(images, label)
         opacity = self._opacity(images, label)
         roughness = self._roughness(images, textures)
+        if opacity is None and (glass := make_glass(mtl_material, roughness)) is not None:
+            model = mtl_material.numbers["illum"][0]
+            self._warnings.append(approximated(f"Illumination model {model:g} of {label} was read as solid glass."))
+            terms = make_glass_terms(mtl_material, glass, textures)
+            return Material(material_name, terms, textures, normal_map, glass=glass), images.slot
         terms, gloss = make_mtl_terms(mtl_material, textures, roughness, has_normal_map=normal_map is not None)
         if gloss is not None:
             self._glosses[material_name] = gloss

@@ -10,6 +10,9 @@ it would turn everything into metal. Hence, in this order:
 3. A gray Ks with a Kd that is not black, without mirror (illum 3 or 8): a dielectric, F0 = min(Ks, 0.04), and a
    microfacet distribution as wide as the highlight, α² = 2 / (Ns + 2) (Walter 2007).
 4. Everything else literally, as metals in this format are: blinn_phong with the color Ks.
+
+Illumination models 6, 7 and 9 with an index Ni above 1 are glass: a solid that refracts, and that Tf passes. Exporters
+write them with d below 1 as well, for surfaces that are blended, and model 4 for opaque ones (Maya, with Ni 1).
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
-from relume.scene.model import Texture
+from relume.scene.model import Glass, Texture
+from relume.scene.validate import MAX_IOR
 from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, Terms, dielectric_reflectance, make_terms
 
 F64 = NDArray[np.float64]
@@ -35,6 +39,8 @@ BLENDER_F0 = 0.08  # at a specular level of 1
 GRAY_SPREAD = 0.05  # between the channels of a gray, relative to the largest
 MIRROR_MODELS = (3, 8)  # illumination models with reflection and without Fresnel
 BLENDER_METAL_MODELS = (3, 6)
+GLASS_MODELS = (6, 7, 9)
+SOLID_M = 1.0  # thickness, which the format does not have, of glass that does not absorb
 
 
 class Dialect(Enum):
@@ -98,6 +104,31 @@ def detect_dialect(lines: Sequence[str]) -> Dialect:
 def gray_terms() -> Terms:
     """Terms of a material without a definition."""
     return make_terms(_surface(np.array(GRAY), PLASTIC_F0, 0.0, 0.5, {}), CoatLayer())
+
+
+def make_glass(mtl_material: MtlMaterial, roughness: float | None) -> Glass | None:
+    """The glass that a material describes, else None.
+
+    Args:
+        mtl_material: its numbers; it is not blended. roughness: as for `make_mtl_terms`.
+    """
+    numbers = mtl_material.numbers
+    ior = numbers.get("Ni", [1.0])[0]
+    red, green, blue = (min(value, 1.0) for value in numbers.get("Tf", [1.0, 1.0, 1.0]))
+    if numbers.get("illum", [2.0])[0] not in GLASS_MODELS or not 1 < ior <= MAX_IOR or max(red, green, blue) == 0:
+        return None
+    return Glass((red, green, blue), ior, SOLID_M, roughness=roughness or 0.0)
+
+
+def make_glass_terms(mtl_material: MtlMaterial, glass: Glass, textures: Mapping[str, Texture]) -> Terms:
+    """Terms of a glass: Fresnel reflection, and what Kd reflects of the light that does not pass.
+
+    Args:
+        mtl_material: its numbers. glass: of `make_glass`. textures: textures by channel.
+    """
+    base = np.array(_color(mtl_material.numbers, "Kd", [0.0, 0.0, 0.0], textures.get("diffuse")))
+    f0 = ((glass.ior - 1) / (glass.ior + 1)) ** 2
+    return make_terms(_surface(base * (1 - np.array(glass.tint)), f0, 0.0, glass.roughness, textures), CoatLayer())
 
 
 def make_mtl_terms(
