@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
+import numba as nb
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
+from relume.core.thread_pools import parallel_for_chunks
 from relume.math.direction_grid import NUM_DIRECTION_BINS, bin_centers, bin_index, bin_solid_angles, fine_bin_centers
 
 F32 = NDArray[np.float32]
@@ -39,14 +41,36 @@ def lobe_table(term: FrozenTerm) -> Shaped[F32, "fine_bins 3 bins"]:
         term: of a complete look, with a white color (`relume.brdf.albedo.white_term`).
     """
     pairs = _pairs()
-    value = _values(term.document, pairs.quadrature)
-    table = np.empty((len(value[0]), 3, NUM_DIRECTION_BINS), np.float32)
-    for channel in range(3):
-        weighted = value[channel % len(value)] * pairs.weight
-        for b, bin_indices in enumerate(pairs.bin_indices):
-            mean = np.bincount(bin_indices, weighted[b], NUM_DIRECTION_BINS) / np.maximum(pairs.total[b], 1e-30)
-            table[b, channel] = mean * (weighted[b].sum() / (mean @ pairs.area))
-    return table
+    values = _values(term.document, pairs.quadrature)
+    arrays = pairs.weight, pairs.bin_indices, pairs.total, pairs.area
+    table = np.empty((values.shape[1], len(values), NUM_DIRECTION_BINS), np.float32)
+    parallel_for_chunks(lambda start, stop: _fill_bins(values, *arrays, start, stop, table), len(table))
+    return np.broadcast_to(table, (len(table), 3, NUM_DIRECTION_BINS))  # one channel stands for three equal ones
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _fill_bins(values, weight, bin_indices, total, area, start, stop, table):  # type: ignore[no-untyped-def]
+    """Average a term over the outgoing bins, for the incident bins [start, stop), scaled to its energy.
+
+    Args:
+        values: f of each pair. (channels, fine bins, n)
+        weight, bin_indices, total, area: see `_DirectionPairs`. table: (fine bins, channels, bins)
+    """
+    mean = np.empty(area.shape[0])
+    for b in range(start, stop):
+        for channel in range(values.shape[0]):
+            mean[:] = 0
+            energy = 0.0
+            for n in range(weight.shape[1]):
+                weighted = values[channel, b, n] * weight[b, n]
+                mean[bin_indices[b, n]] += weighted
+                energy += weighted
+            binned = 0.0
+            for s in range(area.shape[0]):
+                mean[s] /= max(total[b, s], 1e-30)
+                binned += mean[s] * area[s]
+            for s in range(area.shape[0]):
+                table[b, channel, s] = mean[s] * (energy / binned)
 
 
 def _values(document: Mapping[str, Any], pairs: Quadrature) -> F64:
@@ -84,7 +108,7 @@ class _DirectionPairs:
         center_weight = np.broadcast_to(_CENTER_WEIGHT * self.area, (len(wi), NUM_DIRECTION_BINS))
         self.weight = np.concatenate([solid_angle * above, center_weight], axis=1)
         at_centers = np.broadcast_to(np.arange(NUM_DIRECTION_BINS), center_weight.shape)
-        self.bin_indices = np.concatenate([bin_index(reflected), at_centers], axis=1)
+        self.bin_indices = np.concatenate([bin_index(reflected), at_centers], axis=1).astype(np.int16)
         self.total = np.stack(
             [
                 np.bincount(bin_indices, weight, NUM_DIRECTION_BINS)
