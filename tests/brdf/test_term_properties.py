@@ -57,7 +57,8 @@ def test_terms_conserve_energy(model, data, cos_theta_o, phi_o):
 def test_quotient_times_curves_is_the_closed_form_of_the_paper(model, data, seed):
     rng = np.random.default_rng(seed)
     wi, wo = directions(rng, 300), directions(rng, 300)
-    given = data.draw(params(model, one_value=True))
+    drawn = data.draw(params(model, one_value=True))
+    given = {name: round(value, 4) for name, value in drawn.items()}  # Fresnel terms cancel below the steps of sliders
     expected = CLOSED_FORMS[model](wi, wo, **given)
     value = eval_brdf({"model": model, "params": given, "color": [1.0, 0.5, 0.0]}, wi, wo)
     scale = (
