@@ -41,13 +41,13 @@ class BackgroundJobs:
 
     def start_next(self) -> None:
         """Start the next job after a frame, unless one is running."""
-        self.lags_s.append(time.perf_counter() - self._displayed_request_s)
         job = self._picture.next_job() if self._running is None else None
         if job is not None and not job.is_refinement:
             future = self._thread.submit(job.run, lambda share: None, lambda: False)
             self._running = job, future, self._requested_s
         elif self._running is None:
             self._displayed_request_s = self._requested_s
+        self.lags_s.append(time.perf_counter() - self._displayed_request_s)
 
     @property
     def lag_s(self) -> float:

@@ -31,6 +31,9 @@ from relume_bench.timing import percentiles
 _MOVED = 0.01  # of the distance to the target, per frame
 _CACHE_BYTES = 4 << 30
 _GOLDEN = 0.618
+Change = Callable[[dict[str, Any], float], None]
+"""Changes the document of a look, by the fraction of a drag."""
+
 _NUM_WARM_UP = 4  # warm-up drags; their jobs take some tenths of a second each time
 
 
@@ -139,7 +142,7 @@ class FreeCameraScene:
     def edits(
         self,
         frames: int,
-        change: Callable[[dict[str, Any], float], None],
+        change: Change,
         *,
         is_watched: bool = False,
         on_frame: Callable[[FreeCameraPicture, int], None] = lambda picture, k: None,

@@ -1,11 +1,7 @@
-"""probes.all_vs_sun, probes.first_edit_s, probes.incremental_error: camera, light and materials at once, all bounces.
+"""probes.first_edit_s, probes.incremental_error: indirect light that follows edits of materials, all bounces.
 
-`probes.all_vs_sun`: in every frame the camera moves, the environment rotates to a new angle, and the exponent of the
-floor's highlight, which lights all other surfaces, changes, with as many bounces as the bake has (24), and with two; of
-the Cornell box at 400×400, with as many probes as scenes of Sun 2007 had vertices, whose frames per second (table 1,
-light, view and BRDF) are the other side; the smallest ratio. Indirect light is computed in the background, on the same
-cores, and is `lag` old. `probes.first_edit_s`: from the first edit of a material in a bake that has been shown once, to
-the frame that shows its effect on other surfaces; the longest of both scenes and of all drags.
+`probes.first_edit_s`: from the first edit of a material in a bake that has been shown once, to the frame that shows its
+effect on other surfaces; the longest of both scenes and of all drags.
 `probes.incremental_error`: the image at the end of a drag, after the indirect light was updated, against the converged
 one, relative to the change of the drag; the largest, and in the context all, also relative to the image.
 """
@@ -14,61 +10,22 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from relume.core.thread_pools import num_threads
-from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume_bench.figure import Figure
-from relume_bench.free_camera_scene import Drag, FreeCameraScene, run_light_jobs, run_update_jobs
+from relume_bench.free_camera_scene import Change, FreeCameraScene, run_light_jobs, run_update_jobs
 
-_SUN_FRAME_RATES = {13_000: 5.82, 35_700: 3.40, 62_100: 1.53}
-_FRAMES, _STEPS = 24, 8
-Change = Callable[[dict[str, Any], float], None]
+_STEPS = 8
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Change all three at each size; then drag one material after another."""
+    """Drag one material after another."""
     with tempfile.TemporaryDirectory() as folder:
-        context: dict[str, Any] = {"threads": num_threads(), "size": "60×60" if tiny else "400×400"}
-        return [_all(Path(folder), context, tiny), *_measure_drags(Path(folder), tiny)]
-
-
-def _all(folder: Path, context: dict[str, Any], tiny: bool) -> Figure:
-    ratios, size_details = [], dict[str, Any]()
-    for num_probes, sun_fps in list(_SUN_FRAME_RATES.items())[: 1 if tiny else None]:
-        (scratch := folder / str(num_probes)).mkdir()
-        box = FreeCameraScene(
-            "cornell_box", scratch, (60, 60) if tiny else (400, 400), tiny, None if tiny else num_probes
-        )
-        whole, two = (_together(box, 2 if tiny else _FRAMES, bounces) for bounces in (24, 2))
-        ratios.append(1 / (sun_fps * whole.median_s))
-        size_details[f"{box.num_probes}_points"] = (
-            f"{1e3 * whole.median_s:.0f} ms, {1 / whole.median_s:.1f} frames/s, lag {1e3 * whole.lag_s:.0f} ms, "
-            f"two bounces {1e3 * two.median_s:.0f} ms; Sun {sun_fps} frames/s"
-        )
-    return Figure("probes.all_vs_sun", min(ratios), "ratio", {**size_details, **context})
-
-
-def _together(scene: FreeCameraScene, frames: int, bounces: int) -> Drag:
-    """Frames in which all three change."""
-    camera = scene.scene.cameras[0]
-
-    def change(document: dict[str, Any], fraction: float) -> None:
-        document["environment"]["rotation"] = 60 * fraction
-        document["transport"]["bounces"] = bounces
-        _exponent(document, fraction)
-
-    def move(picture: FreeCameraPicture, k: int) -> None:
-        to_world = camera.to_world.copy()
-        to_world[:3, 3] += 0.01 * (k + 1) * to_world[:3, 0]
-        picture.set_camera(replace(camera, to_world=to_world), scene.size)
-
-    return scene.edits(frames, change, is_watched=True, on_frame=move)
+        return _measure_drags(Path(folder), tiny)
 
 
 def _lambert(red: float, green: float, blue: float) -> dict[str, Any]:

@@ -208,9 +208,20 @@ GROUPS = (
             "probes.against_fixed_glossy_0.3",
         ),
     ),
-    Group("relume_bench.probes_edits", ("probes.brdf_vs_sun",)),
+    Group(
+        "relume_bench.free_camera_sun",
+        (
+            "free_camera.view_vs_sun",
+            "free_camera.brdf_vs_sun",
+            "free_camera.all_vs_sun",
+            "free_camera.light_age_ms_13k",
+            "free_camera.light_age_ms_36k",
+            "free_camera.light_age_ms_62k",
+            "free_camera.all_rmse",
+        ),
+    ),
     Group("relume_bench.probes_error", ("probes.probe_rmse",)),
-    Group("relume_bench.probes_live", ("probes.all_vs_sun", "probes.first_edit_s", "probes.incremental_error")),
+    Group("relume_bench.probes_live", ("probes.first_edit_s", "probes.incremental_error")),
     Group("relume_bench.gather_interior", ("gather.interior_bake_s", "gather.interior_store_mb")),
     Group(
         "relume_bench.gather_lights",

@@ -31,7 +31,7 @@ LONG = [
     "workers", "plan", "session", "demo", "canvas", "peer_mitsuba", "reference",
     "gather_error", "gather_full", "gather_scenes", "peer_gather", "lights",
     "memory", "gather_interior", "gather_lights", "ray_saving", "gather",
-    "gather_incremental", "glass", "roughness_maps", "mirror", "probes", "probes_edits",
+    "gather_incremental", "glass", "roughness_maps", "mirror", "probes", "free_camera_sun",
     "probes_reference", "free_camera_accuracy", "free_camera_correction", "canvas_free_camera", "btf",
     "btf_accuracy", "btf_speed", "load", "btf_edit", "many_sessions", "refusal", "slider_drag",
     "probes_static_view", "rotation", "btf_several", "btf_moving", "plan_disk", "probes_live", "probes_error", "assets",

@@ -160,6 +160,27 @@ def test_edits_and_indirect_light_do_not_wait_for_each_other(free_bake, monkeypa
     np.testing.assert_array_equal(picture.image(), make_picture(free_bake, set_exponent(90), other).image())
 
 
+@pytest.fixture
+def many_probes(monkeypatch):
+    """All bakes count as large: indirect light is computed in the background."""
+    monkeypatch.setattr("relume.live.free_camera.probe_light.MAX_PROBES_IN_FRAME", 0)
+
+
+def test_indirect_light_of_few_probes_follows_a_rotating_light_in_each_frame(free_bake, moved_camera):
+    picture = make_watched_picture(free_bake, edit_environment(rotation=340.0))
+    for turn, camera in ((348.0, None), (356.0, moved_camera)):
+        now = make_look(free_bake, add_lights(edit_environment(rotation=turn)))
+        at_once = FreeCameraPicture(free_bake, "front", is_watched=True)
+        for each in (picture, at_once):
+            if camera is not None:
+                each.set_camera(camera, (64, 40))
+            each.set_look(now)
+            assert each.advance(None).fidelity == "preview"
+        np.testing.assert_allclose(picture.image(), at_once.image(), rtol=ROUNDED, atol=ROUNDED)
+        assert picture.next_job().is_refinement
+
+
+@pytest.mark.usefixtures("many_probes")
 def test_indirect_light_lags_behind_a_rotating_light_and_converges(free_bake):
     turns = [make_look(free_bake, add_lights(edit_environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
     picture = make_watched_picture(free_bake, edit_environment(rotation=310.0))
@@ -185,6 +206,7 @@ def test_indirect_light_lags_behind_a_rotating_light_and_converges(free_bake):
     np.testing.assert_array_equal(picture.image(), make_picture(free_bake, edit_environment(rotation=326.0)).image())
 
 
+@pytest.mark.usefixtures("many_probes")
 def test_moving_camera_has_indirect_light_everywhere(free_bake, moved_camera):
     """The light rotates and the camera moves before indirect light is ready: every probe still has indirect light."""
     picture = make_watched_picture(free_bake, edit_environment(rotation=331.0))

@@ -1,8 +1,8 @@
 """Incident coefficients of one session's free-camera image, under changing light.
 
 Exact coefficients are computed when a drag ends. During a drag, direct light is computed in every frame for visible
-probes. Indirect light takes longer than a frame: it is computed in the background, and frames use the latest result
-(`Priority.UPDATE`).
+probes. If lights change, so is indirect light in scenes of few probes. Elsewhere it takes longer than a frame: it is
+computed in the background, and frames use the latest result (`Priority.UPDATE`).
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ from relume.look.model import Rgb
 from relume.transport.incident_coefficients import add_scaled
 
 F32 = NDArray[np.float32]
+
+MAX_PROBES_IN_FRAME = 20_000
+"""Probes whose indirect light is computed within a frame when lights change: some hundredths of a second."""
 
 
 class IndirectCoefficients(NamedTuple):
@@ -229,10 +232,12 @@ class ProbeLightState:
         return combine(transfer, light, get_vectors, hard_shadow_lights, indirect.contributions, rows)
 
     def _latest_indirect(self, light: Illumination, is_needed: NDArray[np.uint8]) -> IndirectCoefficients:
-        """Return the latest indirect light, or compute it if there is none."""
+        """Return the latest indirect light; compute it if there is none, or if few probes need another."""
         transfer, last = self._transfer, self._indirect
-        if last is None or last.light.paths.has_indirect != light.paths.has_indirect:
-            before = light if self._exact is None else self._exact[0].light
+        follows = len(is_needed) <= MAX_PROBES_IN_FRAME
+        is_outdated = follows and self._is_indirect_outdated(light)
+        if last is None or is_outdated or last.light.paths.has_indirect != light.paths.has_indirect:
+            before = light if follows or self._exact is None else self._exact[0].light
             is_reusable = before.paths.has_indirect == light.paths.has_indirect and _is_cached(transfer, before)
             last = _indirect_of(transfer, before if is_reusable else light, is_needed)
         return _extend(transfer, last, is_needed)
