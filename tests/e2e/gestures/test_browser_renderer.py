@@ -63,7 +63,8 @@ def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[tupl
 
 
 def settled(editor: Editor) -> Pixels:
-    """The picture once it has stopped changing."""
+    """The picture once it has stopped changing, without the ring of the focus."""
+    editor.page.evaluate("document.activeElement.blur()")
     expect(editor.page.locator("footer.status")).to_contain_text("Refining", timeout=WAIT_MS)
     editor.page.evaluate(WAIT_FOR_FRAMES)  # what was done has become an edit
     editor.page.wait_for_function("() => window.relumeStats.waiting.length === 0", timeout=DRAWN_MS)
@@ -85,7 +86,9 @@ def num_drawn(page: Page) -> int:
 
 
 def choose(page: Page, who: str) -> None:
+    page.get_by_role("button", name="Options ▾").click()
     page.get_by_label("Renderer").select_option(who)
+    page.keyboard.press("Escape")
 
 
 def draw_here(page: Page) -> None:

@@ -1,4 +1,4 @@
-/** Options of a free camera: field of view, image size, and the cameras saved with the scene. */
+/** Options of a free camera: field of view, image size, renderer, and the cameras saved with the scene. */
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { MAX_CAMERA_PIXELS, type CameraEntry } from "../../protocol";
 import { activeView } from "../../state/views";
@@ -11,6 +11,7 @@ import { nextCameraName, listCameras, MAX_NAME } from "./cameraRequests";
 import { moveFreeCamera, type FreeCamera } from "./freeCamera";
 import { saveCameraAs, removeCamera } from "./savedCameras";
 import { LensSliders, StopAtWalls } from "./LensFields";
+import { RendererSelect } from "./RendererSelect";
 import { levelOrbit } from "./orbit";
 
 const MIN_SIDE = 16;
@@ -105,7 +106,7 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
     <div class="menu" ref={menu} onKeyDown={escape}>
       <button
         aria-expanded={open}
-        title="Field of view, clipping, walls, size and saved cameras"
+        title="Field of view, clipping, walls, size, renderer and saved cameras"
         onClick={() => setOpen(!open)}
       >
         Options ▾
@@ -124,6 +125,7 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
             </button>
           )}
           <ImageSizeFields freeCamera={freeCamera} />
+          <RendererSelect />
           <CameraList scene={scene} freeCamera={freeCamera} name={name} />
         </div>
       )}
