@@ -129,7 +129,7 @@ class LinearReader:
             )
 
 
-class _Block(NamedTuple):
+class _PixelRows(NamedTuple):
     """Rows `start` to `stop` of the data window. pixels: (rows, width, 1 or 3); None if damaged"""
 
     start: int
@@ -146,9 +146,9 @@ class _BlockReader:
 
     def __init__(self, image: oiio.ImageInput, channels: ColorChannels, is_sequential: bool) -> None:
         self._image, self._channels, self._is_sequential = image, channels, is_sequential
-        self._block = _Block(0, 0, np.empty(0, np.float32))
+        self._block = _PixelRows(0, 0, np.empty(0, np.float32))
 
-    def read(self, y: int) -> _Block:
+    def read(self, y: int) -> _PixelRows:
         """Return the block that has row y."""
         if not self._block.start <= y < self._block.stop:
             spec, was_damaged = self._channels.spec, self._block.pixels is None
@@ -156,7 +156,7 @@ class _BlockReader:
             start = y - (y - spec.y) % height
             stop = min(start + height, spec.y + spec.height)
             pixels = None if was_damaged and self._is_sequential else self._pixels(start, stop)
-            self._block = _Block(start, stop, pixels)
+            self._block = _PixelRows(start, stop, pixels)
         return self._block
 
     def _pixels(self, start: int, stop: int) -> F32 | None:
