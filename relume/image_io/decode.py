@@ -75,7 +75,7 @@ class Decoder:
             raise SceneError(f"{label} is damaged, or its format is not supported; save it as PNG") from None
 
     def _decode_other(
-        self, data: bytes, suffix: str, label: str, dtype: oiio.TypeDesc
+        self, data: bytes, suffix: str, label: str, dtype: oiio.BASETYPE
     ) -> Shaped[NDArray[Any], "height width channels"]:
         """Decode an image of 8 or 16 bits with OpenImageIO. Returns 1 to 4 channels: gray or colors, and alpha."""
         options = oiio.ImageSpec()

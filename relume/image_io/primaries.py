@@ -84,7 +84,7 @@ def declared_primaries(values: Sequence[float]) -> tuple[Shaped[F64, "3 3"] | No
     """
     try:
         if len(values) == len(CIE_XYZ) and np.allclose(values, CIE_XYZ, rtol=0, atol=_TOLERANCE):
-            return np.linalg.inv(_to_xyz(np.array(REC_709))), []
+            return np.asarray(np.linalg.inv(_to_xyz(np.array(REC_709)))), []
         return (to_rec_709(values) if any(values) else None), []
     except (TypeError, ValueError) as problem:
         return None, [approximated(f"has invalid color primaries ({problem}); it was read as linear Rec. 709.")]

@@ -163,8 +163,13 @@ class _BlockReader:
         indices = self._channels.indices
         if indices == tuple(range(indices[0], indices[-1] + 1)):
             return self._read_channels(start, stop, indices[0], indices[-1] + 1)
-        planes = [self._read_channels(start, stop, index, index + 1) for index in indices]  # others may be many
-        return None if any(plane is None for plane in planes) else np.concatenate(planes, axis=-1)
+        planes = []
+        for index in indices:  # one by one: there may be many between them
+            plane = self._read_channels(start, stop, index, index + 1)
+            if plane is None:
+                return None
+            planes.append(plane)
+        return np.concatenate(planes, axis=-1)
 
     def _read_channels(self, start: int, stop: int, first: int, last: int) -> F32 | None:
         part, spec = self._channels.part, self._channels.spec

@@ -148,7 +148,7 @@ def to_equirectangular(
     for first in range(0, height, _STRIP_ROWS):
         rows = min(_STRIP_ROWS, height - first)
         v = (np.arange(first * scale, (first + rows) * scale) + 0.5) / (height * scale)
-        directions = uv_to_direction(*np.meshgrid(u, v)).reshape(-1, 3)
+        directions = uv_to_direction(*np.meshgrid(u, v)).reshape(-1, 3).astype(np.float32)
         samples = panorama.lookup(image, directions).reshape(rows * scale, width * scale, 3)
         radiance[first : first + rows] = downsample(samples, (width, rows))
     return radiance
