@@ -13,11 +13,10 @@ import {
 import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
-const TYPES: Record<string, string> = { jpg: "image/jpeg", png: "image/png", tga: "image/x-tga" };
-const file = (name: string) => new File([], name, { type: TYPES[name.split(".").at(-1) ?? ""] ?? "" });
+const file = (name: string) => new File([], name);
 
 function slotsOf(...names: string[]): Record<string, string> {
-  return Object.fromEntries([...planSet(names.map(file), isTextureFile).slots].map(([slot, { name }]) => [slot, name]));
+  return Object.fromEntries([...planSet(names.map(file)).slots].map(([slot, { name }]) => [slot, name]));
 }
 
 test("each map of a set has its place, in whatever order the files come", () => {
@@ -32,7 +31,7 @@ test("each map of a set has its place, in whatever order the files come", () => 
   };
   expect(slotsOf(...names)).toEqual(slots);
   expect(slotsOf(...names.toReversed())).toEqual(slots);
-  expect(planSet(names.map(file), isTextureFile).rejected.map(({ name }) => name)).toEqual([
+  expect(planSet(names.map(file)).rejected.map(({ name }) => name)).toEqual([
     "Metal007_1K_Displacement.jpg",
     "Metal007_1K_AmbientOcclusion.jpg",
   ]);
@@ -59,16 +58,18 @@ test("one image may be roughness and metalness, unless one of them has its own",
   });
 });
 
-test("a preview beside the color is not used, and what cannot be read says how to save it", () => {
-  const { slots, rejected } = planSet(
-    ["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file),
-    isTextureFile,
-  );
-  expect([...slots.values()].map(({ name }) => name)).toEqual(["Marble006_1K_Color.jpg"]);
-  expect(rejected).toEqual([
-    { name: "Marble006_Roughness.tga", reason: "save it as PNG, JPG, WebP or EXR" },
-    { name: "Marble006.png", reason: "another image is used as base color" },
-  ]);
+test("images of every suffix that the server reads are textures", () => {
+  for (const suffix of ["png", "JPG", "webp", "tga", "bmp", "dds", "tif", "tiff", "gif"]) {
+    expect(isTextureFile(file(`oak.${suffix}`))).toBe(true);
+  }
+  expect(isTextureFile(file("oak.psd"))).toBe(false);
+});
+
+test("a preview beside the color is not used", () => {
+  const names = ["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"];
+  const { slots, rejected } = planSet(names.map(file));
+  expect([...slots.values()].map(({ name }) => name)).toEqual(["Marble006_1K_Color.jpg", "Marble006_Roughness.tga"]);
+  expect(rejected).toEqual([{ name: "Marble006.png", reason: "another image is used as base color" }]);
 });
 
 test("one message says what is used and what is not, and a step has the name that the files share", () => {

@@ -1,16 +1,16 @@
 """Decoder for images from untrusted sources: the header's size is checked before decoding.
 
-PNG, JPEG and WebP are decoded by Pillow; BMP, GIF, TIFF and Targa, which older programs write, by OpenImageIO.
+PNG, JPEG and WebP are decoded by Pillow; BMP, DDS, GIF, TIFF and Targa by OpenImageIO. Orientations in metadata are
+applied.
 """
 
 from __future__ import annotations
 
 import io
-import os
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
-from typing import TypeVar
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TypeVar
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813  (the name its own documentation gives it)
@@ -19,7 +19,8 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.image_io.read_linear import check_claim
+from relume.image_io.open_image import check_claim, clear_error, open_image
+from relume.image_io.orientation import orient
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
@@ -28,7 +29,9 @@ MAX_SIDE = 8_192
 MAX_TEXELS = 1_000_000_000  # of all images of a scene together, counted per decoding
 MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
 FORMATS = ("PNG", "JPEG", "WEBP")
-OTHER_FORMATS = {b"BM": ".bmp", b"GIF8": ".gif", b"II*\0": ".tif", b"MM\0*": ".tif"}
+OTHER_FORMATS = {b"BM": ".bmp", b"DDS ": ".dds", b"GIF8": ".gif", b"II*\0": ".tif", b"MM\0*": ".tif"}
+LUMA = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601, as Pillow has it
+_EXIF_ORIENTATION = 274
 TARGA_KINDS = (1, 2, 3, 9, 10, 11)  # with a palette, in color or gray; plain or with run lengths
 
 
@@ -44,13 +47,15 @@ class Decoder:
         Raises:
             SceneError: the image is too large, damaged, or of an unknown format.
         """
-        suffix = find_suffix(data)
-        if suffix:
-            return _decode_other(data, suffix, label, lambda width, height: self._check_size(width, height, label))
+        if suffix := find_suffix(data):
+            return _expand_to_rgba(self._decode_other(data, suffix, label, oiio.UINT8))
         return self._decode(data, label, _rgba)
 
     def decode_gray(self, data: bytes, label: str) -> Shaped[F32, "height width"]:
         """Decode an image to its luma in [0, 1], with all 16 bits of a gray image. Raises SceneError as `decode`."""
+        if suffix := find_suffix(data):
+            values = self._decode_other(data, suffix, label, oiio.FLOAT)
+            return np.asarray(values[..., :3] @ LUMA if values.shape[2] > 2 else values[..., 0], np.float32)
         return self._decode(data, label, _gray)
 
     def _decode(
@@ -59,15 +64,36 @@ class Decoder:
         if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
             raise SceneError(f"{label} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
         try:
-            with PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            with _no_metadata_warnings(), PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
                 self._check_size(*image.size, label)
-                return convert(image)
+                return orient(convert(image), _exif_orientation(image))
         except SceneError:
             raise
         except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
             raise SceneError(f"{label} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
         except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
             raise SceneError(f"{label} is damaged, or its format is not supported; save it as PNG") from None
+
+    def _decode_other(
+        self, data: bytes, suffix: str, label: str, dtype: oiio.BASETYPE
+    ) -> Shaped[NDArray[Any], "height width channels"]:
+        """Decode an image of 8 or 16 bits with OpenImageIO. Returns 1 to 4 channels: gray or colors, and alpha."""
+        options = oiio.ImageSpec()
+        options.attribute("oiio:UnassociatedAlpha", 1)
+        with open_image(data, suffix, label, options) as image:
+            spec = image.spec()
+            self._check_size(spec.width, spec.height, label)
+            if spec.depth != 1 or str(spec.format) in ("half", "float", "double"):
+                raise SceneError(f"{label} is a volume or has texels of {spec.format}; save it as PNG")
+            num_channels = min(spec.nchannels, 4)
+            check_claim(spec.width * spec.height * spec.nchannels, data, label)
+            check_claim(max(spec.tile_width, 1) * max(spec.tile_height, 1) * spec.nchannels * 4, data, label)
+            pixels = image.read_image(0, 0, 0, num_channels, dtype)
+            if pixels is None:
+                clear_error(image.geterror)
+                raise SceneError(f"{label} ends early or is damaged; save it as PNG")
+            values = np.asarray(pixels).reshape(spec.height, spec.width, num_channels)
+            return orient(values, spec.get_int_attribute("Orientation", 1))
 
     def _check_size(self, width: int, height: int, label: str) -> None:
         if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
@@ -98,43 +124,24 @@ def find_suffix(data: bytes) -> str:
     return suffix or (".tga" if is_targa else "")
 
 
-def _decode_other(data: bytes, suffix: str, label: str, check_size: Callable[[int, int], None]) -> U8:
-    """Decode an image of 8 or 16 bits with OpenImageIO, from a private temporary file."""
-    handle, path = tempfile.mkstemp(suffix=suffix)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        options = oiio.ImageSpec()
-        options.attribute("oiio:UnassociatedAlpha", 1)
-        image = oiio.ImageInput.open(path, options)
-        if image is None:
-            oiio.geterror()
-            raise SceneError(f"{label} is damaged, or its format is not supported; save it as PNG")
-        try:
-            return _read_bytes(image, data, label, check_size)
-        finally:
-            image.close()
-    except UnicodeDecodeError:  # names in the header that are not valid text
-        raise SceneError(f"{label} is damaged; save it as PNG") from None
-    finally:
-        Path(path).unlink()
+@contextmanager
+def _no_metadata_warnings() -> Iterator[None]:
+    """Let Pillow ignore damaged metadata, which does not cost the image."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
 
 
-def _read_bytes(image: oiio.ImageInput, data: bytes, label: str, check_size: Callable[[int, int], None]) -> U8:
-    spec = image.spec()
-    if min(spec.width, spec.height) < 1:
-        raise SceneError(f"{label} is damaged, or its format is not supported; save it as PNG")
-    check_size(spec.width, spec.height)
-    if spec.depth != 1 or not 1 <= spec.nchannels <= 4 or str(spec.format) in ("half", "float", "double"):
-        raise SceneError(f"{label} has {spec.nchannels} channels of {spec.format}; save it as PNG")
-    check_claim(spec.width * spec.height * spec.nchannels, data, label)
-    check_claim(max(spec.tile_width, 1) * max(spec.tile_height, 1) * spec.nchannels * 4, data, label)
-    pixels = image.read_image(0, 0, 0, spec.nchannels, oiio.UINT8)
-    if pixels is None:
-        image.geterror()
-        raise SceneError(f"{label} ends early or is damaged; save it as PNG")
-    colors = np.asarray(pixels, np.uint8).reshape(spec.height, spec.width, spec.nchannels)
-    has_alpha = spec.nchannels in (2, 4)
-    alpha = colors[..., -1:] if has_alpha else np.full((*colors.shape[:2], 1), 255, np.uint8)
-    rgb = colors[..., :3] if spec.nchannels > 2 else np.repeat(colors[..., :1], 3, axis=-1)
+def _exif_orientation(image: PIL.Image.Image) -> int:
+    with suppress(Exception):
+        return int(image.getexif().get(_EXIF_ORIENTATION, 1))
+    return 1
+
+
+def _expand_to_rgba(values: U8) -> U8:
+    """Expand gray, gray and alpha, or RGB to RGBA. Alpha is none if zero everywhere: BMP and Targa reserve its byte."""
+    num_channels = values.shape[2]
+    rgb = values[..., :3] if num_channels > 2 else np.repeat(values[..., :1], 3, axis=-1)
+    has_alpha = num_channels in (2, 4) and values[..., -1].any()
+    alpha = values[..., -1:] if has_alpha else np.full((*values.shape[:2], 1), 255, np.uint8)
     return np.concatenate([rgb, alpha], axis=-1)

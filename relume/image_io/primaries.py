@@ -13,6 +13,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.import_warnings import ImporterWarning, approximated
+
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
@@ -21,6 +23,9 @@ Chromaticities = tuple[float, float, float, float, float, float, float, float]
 
 REC_709: Chromaticities = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 """ITU-R BT.709-6."""
+
+CIE_XYZ: Chromaticities = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
+"""OpenEXR's way to say that channels are X, Y and Z."""
 
 INTEROP_SPACES: Mapping[str, Chromaticities] = {
     "lin_rec709_scene": REC_709,
@@ -66,6 +71,23 @@ def to_rec_709(chromaticities: Sequence[float]) -> Shaped[F64, "3 3"] | None:
     if not np.abs(matrix).max() <= _MAX_GAIN:
         raise ValueError("its primaries are too close together")
     return np.asarray(matrix)
+
+
+def declared_primaries(values: Sequence[float]) -> tuple[Shaped[F64, "3 3"] | None, list[ImporterWarning]]:
+    """Matrix that converts the colors of a file to linear Rec. 709.
+
+    Args:
+        values: chromaticities that the file declares; zeros mean unknown. Those of `CIE_XYZ` have no white to adapt to.
+    Returns:
+        The matrix; None if colors stay as they are. A warning about invalid chromaticities, as a predicate: many
+        programs write invalid ones for Rec. 709.
+    """
+    try:
+        if len(values) == len(CIE_XYZ) and np.allclose(values, CIE_XYZ, rtol=0, atol=_TOLERANCE):
+            return np.asarray(np.linalg.inv(_to_xyz(np.array(REC_709)))), []
+        return (to_rec_709(values) if any(values) else None), []
+    except (TypeError, ValueError) as problem:
+        return None, [approximated(f"has invalid color primaries ({problem}); it was read as linear Rec. 709.")]
 
 
 def interop_id(matrix: Shaped[F64, "3 3"]) -> str | None:

@@ -1,4 +1,4 @@
-"""Import of material images from untrusted sources: PNG, JPEG and WebP as bytes, OpenEXR as reflectances."""
+"""Import of material images from untrusted sources: those of `Decoder` as bytes, OpenEXR as reflectances."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ def _check_size(label: str, width: int, height: int) -> None:
 
 
 def _read_exr(data: bytes, label: str, quoted_label: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
-    pixels = read_pixels(data, ".exr", label, partial(_check_size, label))
-    warnings = []
-    broken = ~np.isfinite(pixels).all(axis=-1, keepdims=True)
+    pixels, predicates = read_pixels(data, ".exr", label, partial(_check_size, label))
+    subject = quoted_label[0].upper() + quoted_label[1:]
+    warnings = [ImporterWarning(f"{subject} {predicate}", predicate.severity) for predicate in predicates]
+    broken = np.isnan(pixels).any(axis=-1, keepdims=True)
     if broken.any():
-        num_broken = int(broken.sum())
-        warnings.append(unsupported(f"{num_broken:,} NaN or infinite texels of {quoted_label} were made black."))
+        warnings.append(unsupported(f"{int(broken.sum()):,} NaN texels of {quoted_label} were made black."))
     clamped = np.clip(np.where(broken, np.float32(0), pixels), 0, 1)
     if (clamped != pixels).any(axis=-1, keepdims=True)[~broken].any():
         warnings.append(approximated(f"Values of {quoted_label} below 0 or above 1 were clamped."))

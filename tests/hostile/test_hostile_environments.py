@@ -103,7 +103,8 @@ def test_environment_allocates_nothing_for_missing_data(
     tile: tuple[int, int] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     requested: list[str] = []
-    monkeypatch.setattr(oiio.ImageInput, "read_image", lambda *_: requested.append("pixels"))
+    for name in ("read_image", "read_scanlines", "read_tiles"):
+        monkeypatch.setattr(oiio.ImageInput, name, lambda *_: requested.append("pixels"))
     with pytest.raises(SceneError):
         read_environment(_exr_claiming(16_384, 8_192, tile), "sky")
     assert requested == []
@@ -114,7 +115,8 @@ def test_environment_refuses_tiles_that_cannot_be_in_the_file(
     size: tuple[int, int], tile: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     requested: list[str] = []
-    monkeypatch.setattr(oiio.ImageInput, "read_image", lambda *_: requested.append("pixels"))
+    for name in ("read_image", "read_scanlines", "read_tiles"):
+        monkeypatch.setattr(oiio.ImageInput, name, lambda *_: requested.append("pixels"))
     with pytest.raises(SceneError):
         read_environment(_exr_claiming(*size, tile), "sky")
     assert requested == []

@@ -1,6 +1,6 @@
 /** Files dropped on the editor: each is imported by its type; unsupported ones are reported. */
 import type { DroppedFile } from "../start/files/dropTypes";
-import { isEnvironment, isMeasuredFile, isTextureLike } from "../start/files/sceneFiles";
+import { isEnvironment, isMeasuredFile } from "../start/files/sceneFiles";
 import { editorRejection } from "../start/files/rejections";
 import { isTextureFile, applyImageFiles, consumeDropTarget } from "../panels/inspector/images/importImages";
 import { importMaterials } from "../panels/library/libraryItems";
@@ -13,11 +13,11 @@ export function handleDrop(dropped: readonly DroppedFile[]): void {
   const files = dropped.map(({ file }) => file);
   const environments = files.filter((file) => isEnvironment(file) && !isTextureFile(file));
   const measured = files.filter(isMeasuredFile);
-  const images = files.filter((file) => isTextureFile(file) || isTextureLike(file));
+  const images = files.filter(isTextureFile);
   if (environments.length > 0) void importEnvironmentFile(environments);
   if (measured.length > 0) void importMaterials(measured);
-  if (images.some(isTextureFile)) void applyImageFiles(images, targetMaterial);
-  const accepted = new Set([...environments, ...measured, ...(images.some(isTextureFile) ? images : [])]);
+  if (images.length > 0) void applyImageFiles(images, targetMaterial);
+  const accepted = new Set([...environments, ...measured, ...images]);
   // a folder may also hold unrelated files
   const rejected = dropped.filter(
     ({ path, file }) => !accepted.has(file) && (accepted.size === 0 || !path.includes("/")),

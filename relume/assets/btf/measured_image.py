@@ -53,10 +53,13 @@ def limit_texels(image: Shaped[F32, "height width 3"], max_texels: int) -> Shape
 
 def _linear(data: bytes, name: str) -> F32:
     try:
-        image = read_pixels(data, ".exr", name, lambda width, height: _check_size(width, height, name))
+        image, warnings = read_pixels(data, ".exr", name, lambda width, height: _check_size(width, height, name))
     except SceneError as error:
         raise MaterialError(str(error)) from error
-    if not np.isfinite(image).all():
+    for warning in warnings:
+        if warning.severity != "ignored":  # a measurement is not repaired
+            raise MaterialError(f"{name} {warning.rstrip('.')}; repair it, and pack it again")
+    if np.isnan(image).any():
         raise MaterialError(f"{name} has non-finite values; repair it, and pack it again")
     return np.clip(image, 0, MAX_VALUE)
 

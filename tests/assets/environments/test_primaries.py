@@ -1,12 +1,15 @@
 """Maps in other primaries: published matrices, invariance of color, invalid primaries."""
 
+import re
+
 import numpy as np
 import pytest
 from environment_files import dusk, write_map
+from exr_builder import exr_part, write_exr
 
 from relume.assets.environments.read_environment import read_environment
 from relume.core.errors import SceneError
-from relume.image_io.primaries import REC_709, to_rec_709
+from relume.image_io.primaries import CIE_XYZ, REC_709, to_rec_709
 
 D65 = (0.3127, 0.3290)
 REC_2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65)
@@ -33,17 +36,36 @@ def test_rec_709_primaries_change_nothing():
 
 
 def test_a_map_in_other_primaries_has_the_same_radiance(tmp_path):
-    """Written with the inverse matrix; texels that are not numbers are black as before."""
+    """Written with the inverse matrix; texels that are not numbers are black."""
     expected = dusk()
     other = expected @ np.linalg.inv(np.array(OF_2020)).T
     other[3, 4] = np.nan
-    other[5, 6] = [np.inf, 1, -np.inf]
     actual = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
-    expected[3, 4] = expected[5, 6] = 0
+    expected[3, 4] = 0
     np.testing.assert_allclose(actual.radiance, expected, atol=2e-3 * expected.max(), rtol=2e-3)
     assert [warning.severity for warning in actual.warnings] == ["unsupported"]
     plain = read_environment(write_map(tmp_path / "b.exr", expected, REC_709), "dusk")
     np.testing.assert_array_equal(plain.radiance, expected)
+
+
+@pytest.mark.parametrize("chromaticities", [None, REC_2020])
+def test_infinite_texels_are_as_bright_as_possible(tmp_path, chromaticities):
+    """A sun that exceeds the format stays a white sun; infinite red stays red."""
+    other = dusk()
+    other[3, 4] = np.inf
+    other[5, 6] = [np.inf, 1, -np.inf]
+    actual = read_environment(write_map(tmp_path / "a.exr", other, chromaticities), "dusk")
+    np.testing.assert_array_equal(actual.radiance[3, 4], 1e6)
+    assert actual.radiance[5, 6, 0] == 1e6
+    assert actual.radiance[5, 6, 2] == 0
+    assert "Environment “dusk” has 2 infinite texels, read as the largest number" in actual.warnings[0]
+    half = np.ones((8, 16, 3), np.float16)
+    half[2, 3] = np.inf
+    data = write_exr(tmp_path / "b.exr", exr_part(dict(zip("RGB", np.moveaxis(half, -1, 0), strict=True))))
+    environment = read_environment(data, "sun")
+    np.testing.assert_array_equal(environment.radiance[2, 3], 65_504)
+    assert environment.radiance.sum() == 3 * (65_504 + 127)
+    assert "read as the largest number." in environment.warnings[0]
 
 
 def test_a_gray_map_is_unchanged(tmp_path):
@@ -62,7 +84,6 @@ def test_colors_outside_the_gamut_are_clamped_with_a_warning(tmp_path):
 @pytest.mark.parametrize(
     "primaries",
     [
-        (0.0,) * 8,
         (np.nan, *REC_709[1:]),
         (np.inf, *REC_709[1:]),
         (1e30, *REC_709[1:]),
@@ -73,9 +94,16 @@ def test_colors_outside_the_gamut_are_clamped_with_a_warning(tmp_path):
         (*REC_709[:6], 0.3, -0.3),
     ],
 )
-def test_degenerate_primaries_are_rejected_with_a_message(tmp_path, primaries):
-    with pytest.raises(SceneError, match=r"invalid primaries .* Rec\. 709"):
-        read_environment(write_map(tmp_path / "a.exr", dusk(), primaries), "dusk")
+def test_degenerate_primaries_give_a_warning(tmp_path, primaries):
+    environment = read_environment(write_map(tmp_path / "a.exr", dusk(), primaries), "dusk")
+    np.testing.assert_array_equal(environment.radiance, dusk())
+    assert re.search(r"invalid color primaries .* Rec\. 709", environment.warnings[0])
+
+
+def test_zeros_are_no_primaries(tmp_path):
+    environment = read_environment(write_map(tmp_path / "a.exr", dusk(), (0.0,) * 8), "dusk")
+    np.testing.assert_array_equal(environment.radiance, dusk())
+    assert environment.warnings == ()
 
 
 def test_an_attribute_without_eight_numbers_is_rejected(tmp_path):
@@ -116,3 +144,10 @@ def test_invalid_radiance_primaries_give_a_warning(tmp_path, words):
     np.testing.assert_array_equal(
         actual.radiance, read_environment(write_map(tmp_path / "b.hdr", dusk()), "b").radiance
     )
+
+
+def test_xyz_is_converted_without_adaptation(tmp_path):
+    """IEC 61966-2-1, the matrix from Rec. 709 to XYZ."""
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    environment = read_environment(write_map(tmp_path / "a.exr", dusk() @ to_xyz.T, CIE_XYZ), "dusk")
+    np.testing.assert_allclose(environment.radiance, dusk(), rtol=2e-3, atol=1e-3 * dusk().max())

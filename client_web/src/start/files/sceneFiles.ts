@@ -5,7 +5,7 @@ import { findReferences } from "./references";
 /** Scene formats of the server. */
 export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".stl", ".zip"];
 export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
-const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif", ".tiff", ".gif"];
+export const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".dds", ".tif", ".tiff", ".gif"];
 /** Suffixes of companion files. */
 export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
 
@@ -33,8 +33,8 @@ export function isEnvironment(file: File): boolean {
 }
 
 export const isMeasuredFile = ({ name }: File): boolean => endsWith(name, MEASURED_SUFFIXES);
-/** True if a file is an image, even of an unsupported kind. */
-export const isTextureLike = ({ name }: File): boolean => endsWith(name, IMAGE_SUFFIXES);
+/** True if a file is an image with display values. */
+export const isDisplayImage = ({ name }: File): boolean => endsWith(name, IMAGE_SUFFIXES);
 
 export const isSceneFile = ({ path }: DroppedFile) => endsWith(path, SCENE_SUFFIXES);
 

@@ -1,8 +1,9 @@
 /** A button that uploads an image file. */
 import { useRef } from "preact/hooks";
+import { IMAGE_SUFFIXES } from "../../../start/files/sceneFiles";
 import { imageUploadProgress } from "./imageStore";
 
-const TYPES = ".png,.jpg,.jpeg,.webp,.exr";
+const TYPES = [...IMAGE_SUFFIXES, ".exr"].join(",");
 
 interface Props {
   /** The tooltip: purpose of the image. */

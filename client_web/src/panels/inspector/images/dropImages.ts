@@ -4,14 +4,14 @@ import { requestPixelProbe } from "../../../session/pixelProbe";
 import { pickMaterial } from "../../../render/materialPicking";
 import type { ImageCanvas } from "../../../render/canvas";
 import { hoveredMaterial } from "../../../state/selection";
-import { IMAGE_TYPES, onDrop } from "./importImages";
+import { onDrop } from "./importImages";
 
 const hasFiles = ({ dataTransfer }: DragEvent): boolean => dataTransfer?.types.includes("Files") ?? false;
 
 /** True if images may be among the dragged files: a folder has no type, and reveals its files only on drop. */
 function mayHoldImages({ dataTransfer }: DragEvent): boolean {
   return [...(dataTransfer?.items ?? [])].some(
-    ({ kind, type }) => kind === "file" && (type === "" || IMAGE_TYPES.includes(type)),
+    ({ kind, type }) => kind === "file" && (type === "" || type.startsWith("image/")),
   );
 }
 

@@ -1,5 +1,6 @@
 /** Applies dropped images to the matching maps of a material. */
 import { selectMaterial, selectedMaterial } from "../../../state/selection";
+import { isDisplayImage } from "../../../start/files/sceneFiles";
 import { reportErrors, showNote, showError } from "../../../ui/toasts";
 import { uploadImage } from "../../../session/net/upload";
 import type { ImageBody } from "../../../protocol";
@@ -17,8 +18,6 @@ import {
 } from "./imageStore";
 import { isColorName, detectMap } from "./mapNames";
 import { planSet, setName, setMessage, type Slot } from "./textureSet";
-
-export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
 
 /** The drop target of files: a material, and the map if known. */
 export interface DropTarget {
@@ -43,7 +42,7 @@ export function consumeDropTarget(): DropTarget | null {
 /** True if a file can be a texture. An EXR is one if its name gives the kind of map; others are environments. */
 export function isTextureFile(file: File): boolean {
   const isExr = file.name.toLowerCase().endsWith(".exr");
-  return IMAGE_TYPES.includes(file.type) || (isExr && (detectMap(file.name) !== null || isColorName(file.name)));
+  return isDisplayImage(file) || (isExr && (detectMap(file.name) !== null || isColorName(file.name)));
 }
 
 /** How each kind of map is assigned, and its label. */
@@ -87,7 +86,7 @@ async function uploadSet(slots: ReadonlyMap<Slot, File>, reject: (name: string, 
 /** Apply a set of images to a material, in one step; one message reports the result. */
 async function applySet(material: string, files: readonly File[]): Promise<void> {
   if (imageUploadProgress.value !== null) return showNote("Still uploading; try again in a moment.");
-  const { slots, rejected } = planSet(files, isTextureFile);
+  const { slots, rejected } = planSet(files);
   selectMaterial(material); // the inspector shows the upload progress
   try {
     const uploaded = await uploadSet(slots, (name, reason) => rejected.push({ name, reason }));

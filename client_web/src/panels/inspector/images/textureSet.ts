@@ -47,7 +47,7 @@ function mapRank({ name }: File): number {
 }
 
 /** Assign files to slots; the first file named for a slot gets it. */
-export function planSet(files: readonly File[], isReadable: (file: File) => boolean): SetPlan {
+export function planSet(files: readonly File[]): SetPlan {
   const slots = new Map<Slot, File>();
   const rejected: RejectedFile[] = [];
   const reject = ({ name }: File, reason: string) => rejected.push({ name, reason });
@@ -55,8 +55,7 @@ export function planSet(files: readonly File[], isReadable: (file: File) => bool
     const map = detectMap(file.name);
     const slotNames = map === null ? (["base color"] as const) : (SLOTS[map] ?? []);
     const free = slotNames.filter((slot) => !slots.has(slot));
-    if (!isReadable(file)) reject(file, "save it as PNG, JPG, WebP or EXR");
-    else if (slotNames.length === 0) reject(file, REASONS[map ?? ""] ?? "unknown kind of map");
+    if (slotNames.length === 0) reject(file, REASONS[map ?? ""] ?? "unknown kind of map");
     else if (free.length === 0) reject(file, `another image is used as ${slotNames.join(" and ")}`);
     else for (const slot of free) slots.set(slot, file);
   }
