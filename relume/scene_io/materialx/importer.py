@@ -14,7 +14,7 @@ from relume.core.errors import MaterialError
 from relume.core.import_warnings import ImporterWarning, ignored, quote, unsupported
 from relume.scene_io.gltf.materials import ReadMaterial
 from relume.scene_io.materialx.image_nodes import IMAGE_NODES
-from relume.scene_io.materialx.node_values import Element, NodeValues, UnsupportedNodeError
+from relume.scene_io.materialx.node_values import TOO_COMPLEX, Element, NodeValues, UnsupportedNodeError
 from relume.scene_io.materialx.safe_xml import check_xml
 from relume.scene_io.obj_ply.material_maker import read_companion
 from relume.scene_io.referenced_files import Companions
@@ -132,7 +132,8 @@ def _input_values(shader: Element, values: NodeValues, label: str, warnings: lis
         name = port.getName()
         try:
             value = values.value(port)
-        except UnsupportedNodeError as reason:
+        except (UnsupportedNodeError, RecursionError) as error:
+            reason = TOO_COMPLEX if isinstance(error, RecursionError) else error
             warnings.append(unsupported(f"{name} of {label} has its default: {reason}."))
             continue
         if value is not None and name in _UNUSED:

@@ -19,6 +19,7 @@ from relume.scene_io.surfaces.surface_inputs import Rgb, Value, scaled
 
 Element = Any  # MaterialX has no types
 MAX_STEPS = 20_000  # nodes that the inputs of one document visit
+TOO_COMPLEX = "its node graph is too complex"
 SRGB = ("srgb_texture", "srgb_rec709_scene", "srgb_rec709_display", "sRGB")
 LINEAR = ("", "lin_rec709", "lin_rec709_scene", "linear", "none", "raw", "data")
 _CHANNELS = {"x": "r", "y": "g", "z": "b", "w": "a", "r": "r", "g": "g", "b": "b", "a": "a"}
@@ -58,7 +59,7 @@ class NodeValues:
         """Follow the interfaces of graphs from an input. Raises UnsupportedNodeError."""
         self._remaining_steps -= 1
         if self._remaining_steps < 0:
-            raise UnsupportedNodeError("its node graph is too complex")
+            raise UnsupportedNodeError(TOO_COMPLEX)
         if not port.getInterfaceName():
             return port
         outer = port.getInterfaceInput()

@@ -24,6 +24,8 @@ def check_xml(data: bytes) -> list[str]:
     scan = _Scan()
     try:
         scan.parser.Parse(data, True)
+    except MaterialError:
+        raise
     except expat.ExpatError as error:
         reason = expat.errors.messages.get(error.code, "damaged")
         raise MaterialError(f"line {error.lineno} of the .mtlx file is not XML ({reason}); export it again") from None
