@@ -14,6 +14,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from relume.brdf.texture_slots import IMAGES
+from relume.core.errors import MaterialError
 from relume.images.image_store import load_texture
 from relume.imported_materials.material_store import store_materials
 from relume.scene.texture_encoding import decode
@@ -44,6 +45,9 @@ def packed(document: str) -> bytes:
 
 
 def test_rest_imports_lists_shows_and_deletes(client: TestClient) -> None:
+    refused = client.post(URL, files={"material": ("a.mtlx", b"<html/>")})
+    assert (refused.status_code, refused.json()["type"]) == (422, "urn:relume:problem:material")
+    assert "not MaterialX" in refused.json()["detail"]
     response = client.post(URL, files={"material": ("set/tiles.zip", packed(TILED.format(tiling="2, 1")))})
     assert response.status_code == 201, response.text
     made: dict[str, Any] = response.json()
@@ -70,20 +74,18 @@ def test_rest_imports_lists_shows_and_deletes(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "data", "message"),
+    ("data", "message"),
     [
-        ("a.mtlx", b"<html/>", "not MaterialX"),
-        ("a.mtlx", b"", "not XML"),
-        ("a.zip", b"PK\3\4", "truncated"),
-        ("a.zip", packed("<materialx/>").replace(b".mtlx", b".text"), "0 MaterialX files; pack one of .mtlx"),
+        (b"", "not XML"),
+        (b"PK\3\4", "truncated"),
+        (packed("<materialx/>").replace(b".mtlx", b".text"), "0 MaterialX files; pack one of .mtlx"),
     ],
 )
-def test_unusable_files_are_refused(client: TestClient, name: str, data: bytes, message: str) -> None:
-    response = client.post(URL, files={"material": (name, data)})
-    assert response.status_code == 422
-    assert response.json()["type"] == "urn:relume:problem:material"
-    assert message in response.json()["detail"]
-    assert client.get(URL).json() == []
+def test_unusable_files_are_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    (tmp_path / "a.zip").write_bytes(data)
+    with pytest.raises(MaterialError, match=message):
+        store_materials(tmp_path / "made", tmp_path / "images", tmp_path / "a.zip", "A")
+    assert not (tmp_path / "made").exists()
 
 
 def test_command_line_imports_a_document_with_the_images_of_its_folder(
