@@ -176,8 +176,9 @@ def summary(table: dict[str, Outcome]) -> str:
 
 
 def _kind_of(reason: str) -> str:
-    """A reason without names and numbers."""
-    return re.sub(r"\d[\d,.]*", "N", re.sub(r"“[^”]*”|'[^']*'|\([^)]*\)|\b[\w.-]+\.\w{3,5}\b", "…", reason))[:90]
+    """A reason without names, numbers and addresses in a document."""
+    plain = re.sub(r"“[^”]*”|(?<!\w)'[^']*'?|\([^)]*\)", "…", re.sub(r" at \S+: .*", "", reason))
+    return re.sub(r"\d[\d,.]*", "N", plain)[:90]
 
 
 def differences(expected: dict[str, Outcome], outcomes: dict[str, Outcome]) -> list[str]:
