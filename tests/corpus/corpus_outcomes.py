@@ -34,11 +34,12 @@ ENVIRONMENTS = (".hdr", ".exr")
 IMAGES = (".png", ".jpg", ".jpeg", ".webp")
 MEASURED = (".binary", ".bsdf", ".brdf", ".pbsdf")
 MATERIALX = (".mtlx",)
-_NAMING = (*SCENES, *MATERIALX, ".mtl")
-_NAMED = re.compile(rb"[^\"'<>@|/\\\r\n\t\0=:]{1,100}\.(?:png|jpe?g|webp|exr|hdr|usd[acz]?|mtlx)\b", re.IGNORECASE)
+_NAMING = (".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".mtl", *MATERIALX)
+_SUFFIX = re.compile(rb"\.(?:png|jpe?g|webp|exr|hdr|usd[acz]?|mtlx)\b", re.IGNORECASE)
+_DELIMITER = re.compile(rb"[\"'<>@|/\\\r\n\t\0=:]")
 _LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 MAX_WARNINGS, MAX_TEXT = 6, 120
-MAX_NAMING_BYTES = 64 << 20
+MAX_NAMING_BYTES, MAX_NAME_BYTES = 4 << 20, 100
 PEER_SECONDS = 20
 
 
@@ -58,9 +59,11 @@ def list_files(root: Path) -> list[str]:
 def _named_by(path: Path) -> Iterator[str]:
     """Names of files in a file; in a line of an .mtl library, a keyword and options may precede them."""
     with path.open("rb") as file:
-        for match in _NAMED.findall(file.read(MAX_NAMING_BYTES)):
-            name = match.decode("utf-8", "replace").strip()
-            yield from (name, name.split()[-1])
+        data = file.read(MAX_NAMING_BYTES)
+    for match in _SUFFIX.finditer(data):
+        before = _DELIMITER.split(data[max(match.start() - MAX_NAME_BYTES, 0) : match.start()])[-1]
+        name = (before + match[0]).decode("utf-8", "replace").strip()
+        yield from (name, name.split()[-1]) if path.suffix.lower() == ".mtl" else (name,)
 
 
 def _set_of(path: Path) -> tuple[str, ...]:
