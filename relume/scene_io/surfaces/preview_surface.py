@@ -21,12 +21,13 @@ _PRESENCE = 1  # value of opacityMode
 def preview_surface(inputs: SurfaceInputs) -> SurfaceParameters:
     """Convert the inputs of `UsdPreviewSurface`."""
     base, metallic = inputs.color("diffuseColor", (0.18, 0.18, 0.18)), inputs.scalar("metallic", 0)
-    ior, specular_color = inputs.number("ior", 1.5, 1e6), WHITE
+    ior = inputs.number("ior", 1.5, 1e6)
+    specular_color: Color = WHITE
     if inputs.number("useSpecularWorkflow", 0) > 0:
         base, metallic, ior, specular_color = _specular_workflow(inputs, base)
     opacity, cutoff = inputs.scalar("opacity", 1), inputs.number("opacityThreshold", 0)
-    is_glass = not isinstance(opacity, ImageInput) and cutoff == 0 and inputs.number("opacityMode", 0) != _PRESENCE
-    transmission = 1 - opacity if is_glass and not isinstance(opacity, ImageInput) else 0.0
+    is_glass = cutoff == 0 and inputs.number("opacityMode", 0) != _PRESENCE
+    transmission = 0.0 if isinstance(opacity, ImageInput) or not is_glass else 1 - opacity
     if inputs.is_image("displacement") or inputs.number("displacement", 0, inf) > 0:
         inputs.warn_unsupported(f"Displacement of {inputs.label} isn't supported.")
     return SurfaceParameters(
@@ -39,7 +40,7 @@ def preview_surface(inputs: SurfaceInputs) -> SurfaceParameters:
         clearcoat_roughness=inputs.scalar("clearcoatRoughness", 0.01),
         transmission=transmission,
         emission=inputs.color("emissiveColor", _BLACK, 1e9),
-        alpha=1.0 if is_glass else opacity,
+        alpha=1.0 if transmission > 0 else opacity,
         alpha_mode="MASK" if cutoff > 0 else "BLEND",
         alpha_cutoff=cutoff,
         normal=inputs.normal("normal"),

@@ -81,7 +81,7 @@ class SurfaceImages:
             return np.full(3, scalar_bytes(pixels, image).mean() / 255 * image.factor[0])
         values = SRGB_TO_LINEAR if image.is_srgb else (np.arange(256) / 255).astype(np.float32)
         counts = [np.bincount(pixels[..., k].ravel(), minlength=256) for k in range(3)]
-        return np.array(counts) @ values / counts[0].sum() * np.array(image.factor)
+        return np.asarray(np.array(counts) @ values / counts[0].sum() * np.array(image.factor))
 
     def _decode(self, file: str, label: str) -> U8 | None:
         try:
