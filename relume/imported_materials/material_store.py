@@ -19,7 +19,7 @@ from relume.brdf.term_validation import complete_term
 from relume.core.errors import MaterialError, SceneError
 from relume.core.import_warnings import ImporterWarning, by_severity, warning_of
 from relume.imported_materials.library_look import library_look
-from relume.scene_io.materialx.importer import import_materialx
+from relume.scene_io.materialx.import_document import import_materialx
 from relume.scene_io.referenced_files import Companions, NoFiles
 from relume.scene_io.zip_scene import open_zip
 

@@ -25,7 +25,7 @@ from relume.core.errors import RelumeError
 from relume.core.import_warnings import ImporterWarning
 from relume.images.read_image import read_image
 from relume.scene_io.import_scene import import_scene
-from relume.scene_io.materialx.importer import import_materialx
+from relume.scene_io.materialx.import_document import import_materialx
 from relume.scene_io.referenced_files import Folder
 
 Outcome = dict[str, Any]

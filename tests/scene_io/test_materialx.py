@@ -17,7 +17,7 @@ from relume.core.errors import MaterialError
 from relume.scene.model import Texture
 from relume.scene.texture_encoding import decode
 from relume.scene_io.gltf.materials import ReadMaterial
-from relume.scene_io.materialx.importer import MaterialXDocument, import_materialx
+from relume.scene_io.materialx.import_document import MaterialXDocument, import_materialx
 from relume.scene_io.referenced_files import Folder, NamedFiles
 
 pytest.importorskip("MaterialX", reason="pip install relume[materialx]")

@@ -21,7 +21,7 @@ _CACHE_BYTES = 300_000_000  # of decoded images, which other materials may use
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
 
-class Textures(Protocol):
+class TextureSource(Protocol):
     """Textures by index, see `ImageReader.texture`."""
 
     def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]: ...

@@ -76,7 +76,7 @@ def tinted(color: Color, tint: Rgb) -> Color:
 
 
 @dataclass(frozen=True)
-class Transmission:
+class TransmissionLayer:
     """Transmission of a surface.
 
     Attributes:
@@ -93,7 +93,7 @@ class Transmission:
     thickness: float
 
     @staticmethod
-    def read(inputs: SurfaceInputs, weight_name: str, thin_name: str) -> Transmission:
+    def read(inputs: SurfaceInputs, weight_name: str, thin_name: str) -> TransmissionLayer:
         """Read the inputs that OpenPBR and Standard Surface share.
 
         Args:
@@ -101,14 +101,14 @@ class Transmission:
         """
         weight = inputs.scalar(weight_name, 0.0)
         if weight == 0:
-            return Transmission(0.0, inf, WHITE, WHITE, 0.0)
+            return TransmissionLayer(0.0, inf, WHITE, WHITE, 0.0)
         if any(inputs.constant_color("transmission_scatter", (0.0, 0.0, 0.0))):
             inputs.warn_unsupported(f"Scattering inside {inputs.label} isn't supported; it is shown clear.")
         depth = inputs.number("transmission_depth", 0.0, 1e6)
         thickness = 0.0 if inputs.number(thin_name, 0.0) > 0 else depth or 1.0
         if depth == 0:
-            return Transmission(weight, inf, inputs.color("transmission_color", WHITE), WHITE, thickness)
-        return Transmission(weight, depth, WHITE, inputs.constant_color("transmission_color", WHITE), thickness)
+            return TransmissionLayer(weight, inf, inputs.color("transmission_color", WHITE), WHITE, thickness)
+        return TransmissionLayer(weight, depth, WHITE, inputs.constant_color("transmission_color", WHITE), thickness)
 
     def base(self, inputs: SurfaceInputs, weight_name: str, base: Color) -> Color:
         """The base color in glTF. See `transmissive_base`."""

@@ -6,7 +6,7 @@ from math import sqrt
 
 from relume.scene_io.surfaces.layers import (
     WHITE,
-    Transmission,
+    TransmissionLayer,
     anisotropic_highlight,
     coat_tint,
     subsurface_base,
@@ -31,7 +31,7 @@ def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
     coat = inputs.scalar("coat_weight", 0)
     is_darkened = inputs.number("coat_darkening", 1) > 0
     tint = coat_tint(inputs, coat, inputs.number("coat_ior", 1.6, 10), darkens=is_darkened)
-    transmission = Transmission.read(inputs, "transmission_weight", "geometry_thin_walled")
+    transmission = TransmissionLayer.read(inputs, "transmission_weight", "geometry_thin_walled")
     base = transmission.base(inputs, "transmission_weight", base)
     roughness, anisotropy = anisotropic_highlight(inputs, 0.3, "specular_roughness_anisotropy", _widths)
     return SurfaceParameters(

@@ -6,7 +6,7 @@ from math import inf, pi, sqrt
 
 from relume.scene_io.surfaces.layers import (
     WHITE,
-    Transmission,
+    TransmissionLayer,
     anisotropic_highlight,
     coat_tint,
     subsurface_base,
@@ -26,7 +26,7 @@ def standard_surface(inputs: SurfaceInputs) -> SurfaceParameters:
     warn_rough_diffuse(inputs, inputs.number("diffuse_roughness", 0))
     coat = inputs.scalar("coat", 0)
     tint = coat_tint(inputs, coat, inputs.number("coat_IOR", 1.5, 10))
-    transmission = Transmission.read(inputs, "transmission", "thin_walled")
+    transmission = TransmissionLayer.read(inputs, "transmission", "thin_walled")
     base = transmission.base(inputs, "transmission", base)
     roughness, anisotropy = anisotropic_highlight(inputs, 0.2, "specular_anisotropy", _widths)
     return SurfaceParameters(

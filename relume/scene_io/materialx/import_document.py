@@ -66,7 +66,7 @@ def import_materialx(data: bytes, companions: Companions) -> MaterialXDocument:
     document = _parse(data)
     images = SurfaceImages(lambda name, label: read_companion(companions, "", name, label, warnings), warnings)
     values, maker = NodeValues(IMAGE_NODES, warnings), SurfaceMaterials(images, warnings)
-    materials = []
+    materials = list[ReadMaterial]()
     for name, shader in _surfaces(document, warnings):
         if len(materials) == MAX_MATERIALS:
             raise MaterialError(f"the .mtlx file has more than {MAX_MATERIALS} materials; split it")
