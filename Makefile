@@ -33,7 +33,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # Bytecode is kept, whatever the shell says: tests start hundreds of processes, each of which would compile all sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-slow bench soak lint audit lock clean client-check
+.PHONY: help setup demo test test-slow corpus bench soak lint audit lock clean client-check
 
 help:  ## what each target does
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
@@ -51,6 +51,9 @@ test:  ## everything that must hold before a commit
 
 test-slow: setup  ## the long tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -m slow --timeout=3600
+
+corpus: setup  ## rewrite the table of what opening each file of the shared data ends as
+	$(ONE_THREAD) $(BIN)/python -W ignore tests/corpus/write.py
 
 bench: setup  ## the project's own figures
 	$(BIN)/relume bench $(ARGS)

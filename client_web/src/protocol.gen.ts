@@ -618,6 +618,15 @@ export interface ImportOptions {
   recenter: "auto" | "always" | "never";
 }
 
+/** A file with materials. `warnings`: most severe first. */
+export interface ImportedBody {
+  id: string;
+  name: string;
+  created: string;
+  materials: LibraryMaterialBody[];
+  warnings: SceneWarning[];
+}
+
 /** server → client: one pixel; `bands` is the contribution of each band of the active curve, per channel. `position` and `normal`: of the surface that covers most of the pixel, world space; null for background. */
 export interface InspectAnswer {
   type: "inspect";
@@ -630,6 +639,15 @@ export interface InspectAnswer {
   radiance: [number, number, number];
   curve: string | null;
   bands: number[][] | null;
+}
+
+/** One material of an imported file. `terms`: complete, with uploaded images as textures. `normal_map`, `glass`: as in a look, null if it has none; `glass` applies to objects that are glass in the scene. */
+export interface LibraryMaterialBody {
+  name: string;
+  terms: Record<string, unknown>[];
+  normal_map: Record<string, unknown> | null;
+  glass: Record<string, unknown> | null;
+  thumbnail: string;
 }
 
 /** Light lists for lobes: `bins_per_side` of the map of direction bins, `max_listed` lights per bin, `lights_per_bright_light`; `min_width` is the smallest σ in radians of `widths` steps, each √2 times the one before. */

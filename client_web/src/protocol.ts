@@ -102,6 +102,12 @@ export type LightKind = doc.LightLook["kind"];
 /** A library material, its terms in look-document form. */
 export type MeasuredBody = Omit<gen.MeasuredBody, "terms"> & { terms: Term[] };
 export type MetalnessBody = Omit<gen.MetalnessBody, "terms"> & { terms: Term[] };
+export type LibraryMaterialBody = Omit<gen.LibraryMaterialBody, "terms" | "normal_map" | "glass"> & {
+  terms: Term[];
+  normal_map: MaterialLook["normal_map"];
+  glass: MaterialLook["glass"];
+};
+export type ImportedBody = Omit<gen.ImportedBody, "materials"> & { materials: LibraryMaterialBody[] };
 export type BtfBody = Omit<gen.BtfBody, "terms"> & { terms: Term[] };
 export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 

@@ -1,5 +1,6 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
 import {
+  applyImported,
   otherGroupMatches,
   group,
   importMaterial,
@@ -10,6 +11,7 @@ import {
   showGroup,
   visibleEntries,
 } from "../src/panels/library/libraryItems";
+import { look } from "../src/state/look";
 import { highlightOf, positionOf, highlightAt, mapRange } from "../src/panels/library/navigationMap";
 
 const POINTS = [
@@ -88,6 +90,34 @@ describe("what is found elsewhere", () => {
   });
 });
 
+describe("an imported material", () => {
+  afterEach(() => vi.unstubAllGlobals());
+  const terms = [{ model: "lambert", color: [1, 1, 1], texture: "image:0123456789abcdef", params: {}, curves: {} }];
+  const glass = { color: [1, 0, 0], absorption: [1, 2, 3], roughness: 0.5, ior: 1.3 };
+  const imported = { name: "Oak", terms, normal_map: { image: "image:1", scale: 2 }, glass, thumbnail: "" } as never;
+  const thin = { color: [1, 1, 1], roughness: 0, ior: 1.5 };
+
+  it("brings its textures and its normal map, and its glass to objects of glass", () => {
+    const materials = {
+      Table: { terms: [], normal_map: null, shadow_catcher: false },
+      Pane: { terms: [], glass: thin },
+      Vase: { terms: [], glass: { ...thin, absorption: [0, 0, 0] } },
+    };
+    vi.stubGlobal("window", globalThis);
+    look.value = { materials } as never;
+    for (const target of Object.keys(materials)) applyImported(target, imported);
+    const normals = { terms, normal_map: { image: "image:1", scale: 2 } };
+    expect(look.value).toEqual({
+      materials: {
+        Table: { ...normals, shadow_catcher: false },
+        Pane: { ...normals, glass: { color: [1, 0, 0], roughness: 0.5, ior: 1.3 } },
+        Vase: { ...normals, glass },
+      },
+    });
+    look.value = null;
+  });
+});
+
 describe("files for the library", () => {
   afterEach(() => vi.unstubAllGlobals());
 
@@ -95,7 +125,9 @@ describe("files for the library", () => {
     ["felt.zip", "/api/materials/btf/jobs"],
     ["carpet01_W400xH400.BTF", "/api/materials/btf/jobs"],
     ["gold.binary", "/api/materials/measured"],
-  ])("%s goes where it is read", async (name, path) => {
+    ["gold.mtlx", "/api/materials/imported"],
+    ["gold.zip", "/api/materials/imported", "…Gold.MTLX…"],
+  ])("%s goes where it is read", async (name, path, content = "!") => {
     const requests: string[] = [];
     class Request {
       upload = {};
@@ -109,7 +141,7 @@ describe("files for the library", () => {
     }
     vi.stubGlobal("window", globalThis);
     vi.stubGlobal("XMLHttpRequest", Request);
-    await importMaterial(new File(["!"], name));
+    await importMaterial(new File([content], name));
     expect(requests).toEqual([path]);
   });
 });

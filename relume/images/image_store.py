@@ -130,6 +130,27 @@ def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callabl
         return get_record(folder, IMAGES.store(folder, source, name, fill))
 
 
+def store_texture(folder: Path, name: str, texture: Texture) -> ImageRecord:
+    """Store a texture of an imported material under the hash of its texels.
+
+    Args:
+        folder: folder of the asset store. name: shown to users. texture: bytes with three channels.
+    Raises:
+        SceneError: the store is full.
+    """
+    encoding = texture.encoding or TextureEncoding("srgb")
+    scale = encoding.scale if encoding.kind == "srgb" else (1.0, 1.0, 1.0)  # of other kinds it is in the look
+
+    def fill(staged_folder: Path) -> dict[str, Any]:
+        return _write(staged_folder, texture) | {"warnings": [], "scale": scale, "wrap": texture.wrap}
+
+    with tempfile.TemporaryDirectory() as unfinished:
+        source = Path(unfinished) / "texels"
+        header = json.dumps([texture.pixels.shape, scale, texture.wrap]).encode()
+        source.write_bytes(header + np.ascontiguousarray(texture.pixels).tobytes())
+        return get_record(folder, IMAGES.store(folder, source, name, fill))
+
+
 def _write(folder: Path, texture: Texture) -> dict[str, Any]:
     """Write an image's files; return their fields of the record."""
     height, width = texture.pixels.shape[:2]

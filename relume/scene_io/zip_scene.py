@@ -16,9 +16,11 @@ SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
 
 
-def open_zip(data: bytes) -> tuple[bytes, Archive]:
+def open_zip(data: bytes, suffixes: tuple[str, ...] = SCENE_SUFFIXES, kind: str = "scene") -> tuple[bytes, Archive]:
     """Open the scene file in an archive, and its companions.
 
+    Args:
+        data: the archive. suffixes: of the file that names the others. kind: names that file in messages.
     Raises:
         SceneError: the archive is damaged, encrypted, too large, or does not contain exactly one scene file.
     """
@@ -32,11 +34,10 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
         raise SceneError("the .zip file is damaged; pack it again") from None
     entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
     _check_entries(entries)
-    scenes = [entry for entry in entries if entry.filename.lower().endswith(SCENE_SUFFIXES)]
+    scenes = [entry for entry in entries if entry.filename.lower().endswith(suffixes)]
     if len(scenes) != 1:
-        raise SceneError(
-            f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj, .ply or .stl"
-        )
+        names = " or ".join(", ".join(suffixes).rsplit(", ", 1))
+        raise SceneError(f"the .zip file contains {len(scenes)} {kind} files; pack one of {names}")
     folder = posixpath.dirname(scenes[0].filename.replace("\\", "/"))
     return read_entry(archive, scenes[0]), Archive(archive, folder)
 

@@ -32,7 +32,7 @@ from relume_server.api import (
     shares,
     viewport,
 )
-from relume_server.api.assets import balls, btf_jobs, btfs, environments, images, library, materials
+from relume_server.api.assets import balls, btf_jobs, btfs, environments, images, imported, library, materials
 from relume_server.api.pagination import check_query
 from relume_server.auth.middleware import AuthMiddleware
 from relume_server.auth.rules import methods_at
@@ -62,6 +62,7 @@ ROUTE_GROUPS = (
     color,
     models,
     materials,
+    imported,
     btf_jobs,  # before btfs, whose route would match "jobs" as an id
     btfs,
     library,

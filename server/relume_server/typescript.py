@@ -113,6 +113,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     images.ImageBody,
     images.MetalnessBody,
     bodies.MeasuredBody,
+    bodies.ImportedBody,
     bodies.BtfBody,
     btfs.BtfJobBody,
     bodies.PlanBody,

@@ -26,6 +26,11 @@ def materials_path(data_dir: Path) -> Path:
     return data_dir / "materials"
 
 
+def imported_materials_path(data_dir: Path) -> Path:
+    """Folder of imported materials; see `relume.imported_materials.material_store`."""
+    return data_dir / "imported"
+
+
 def btfs_path(data_dir: Path) -> Path:
     """Folder of BTFs; see `relume.assets.btf.btf_store`."""
     return data_dir / "btfs"

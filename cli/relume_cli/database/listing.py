@@ -103,7 +103,8 @@ def _environments(data_folder: OpenFolder) -> Iterator[Row]:
 def _materials(data_folder: OpenFolder) -> Iterator[Row]:
     from relume.assets.btf import btf_store
     from relume.assets.measured import measured_store
-    from relume_worker.paths import btfs_path, materials_path
+    from relume.imported_materials import material_store
+    from relume_worker.paths import btfs_path, imported_materials_path, materials_path
 
     material_records: list[MaterialRecord | BtfRecord] = [
         *measured_store.records(materials_path(data_folder.settings.data)),
@@ -113,6 +114,10 @@ def _materials(data_folder: OpenFolder) -> Iterator[Row]:
         created, terms = iso_time(record.created), record.terms()
         document = {"id": record.id, "data": record.data, "name": record.name, "created": created, "terms": terms}
         yield document, f"{record.data:21}  {record.name}"
+    for imported in material_store.records(imported_materials_path(data_folder.settings.data)):
+        names = [material.name for material in imported.materials]
+        document = {"id": imported.id, "name": imported.name, "created": iso_time(imported.created), "materials": names}
+        yield document, f"{imported.id:21}  {imported.name}: {', '.join(names)}"
 
 
 def _images(data_folder: OpenFolder) -> Iterator[Row]:

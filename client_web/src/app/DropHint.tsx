@@ -10,7 +10,7 @@ export function DropHint() {
         <dd>{material === null ? "drop on an object" : `apply to “${material}”`}</dd>
         <dt>HDRI (.hdr, .exr)</dt>
         <dd>light the scene</dd>
-        <dt>Measured materials (.binary, .btf)</dt>
+        <dt>Materials (.mtlx, .binary, .btf)</dt>
         <dd>add to the Library</dd>
       </dl>
     </div>

@@ -5,6 +5,8 @@ glTF 2.0 specification, sections 3.8 and 3.9.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
@@ -17,6 +19,12 @@ from relume.scene_io.gltf.container import GltfContainer
 U8 = NDArray[np.uint8]
 _CACHE_BYTES = 300_000_000  # of decoded images, which other materials may use
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
+
+
+class TextureSource(Protocol):
+    """Textures by index, see `ImageReader.texture`."""
+
+    def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]: ...
 
 
 class ImageReader:

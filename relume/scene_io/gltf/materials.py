@@ -24,7 +24,7 @@ from relume.scene.validate import MAX_IOR
 from relume.scene_io.gltf.blend import MetallicBlend, lerp
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import TextureInfo
-from relume.scene_io.gltf.images import ImageReader
+from relume.scene_io.gltf.images import TextureSource
 from relume.scene_io.gltf.material_extensions import Clearcoat, MaterialExtensions, read_extensions
 from relume.scene_io.gltf.texture_resampling import Raster
 from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, dielectric_reflectance, make_terms
@@ -75,7 +75,7 @@ WHITE = VertexColors()
 class MaterialReader:
     """Converts the materials of one file, with a limit on their texels."""
 
-    def __init__(self, images: ImageReader, warnings: list[ImporterWarning]) -> None:
+    def __init__(self, images: TextureSource, warnings: list[ImporterWarning]) -> None:
         self._images = images
         self._warnings = warnings
         self._names: dict[str, int] = {}

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from relume_server.settings import Settings
 
 log = logging.getLogger(__name__)
-OwnedKind = Literal["upload", "scene", "environment", "material", "btf-job", "btf", "image", "bake", "render"]
+OwnedKind = Literal[
+    "upload", "scene", "environment", "material", "btf-job", "btf", "image", "imported", "bake", "render"
+]
 MAX_STREAMS_EACH = 32
 """Maximum number of event streams per caller."""
 

@@ -20,13 +20,22 @@ from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
 from relume.core.errors import RelumeError
+from relume.core.folder_size import folder_bytes
+from relume.imported_materials.material_store import STORE as IMPORTED
 from relume_server.auth.quotas import OwnedKind, Quotas
 from relume_server.auth.reservations import MAX_CONCURRENT_IMPORTS, Reservation
 from relume_server.io.fair_slots import Slots
 from relume_server.io.import_processes import Importers, ImportTooLargeError
+from relume_server.io.import_request import IMAGES as IMAGES_FOLDER
 from relume_server.io.import_request import SUMMARY, UPLOAD_PREFIX, ImportRequest
 from relume_worker.ledger import Ledger
-from relume_worker.paths import environments_path, images_path, materials_path, scene_path
+from relume_worker.paths import (
+    environments_path,
+    images_path,
+    imported_materials_path,
+    materials_path,
+    scene_path,
+)
 from relume_worker.scenes import insert_scene
 
 if TYPE_CHECKING:
@@ -39,6 +48,7 @@ _STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
     "environment": (ENVIRONMENTS, environments_path, "environment"),
     "image": (IMAGES, images_path, "image"),
     "material": (MATERIALS, materials_path, "material"),
+    "imported": (IMPORTED, imported_materials_path, "imported"),
 }
 
 
@@ -103,14 +113,23 @@ class ImportQueue:
         target = scene_path(self._settings.data, identity)
         if store is not None:
             target = store[1](self._settings.data) / store[0].path(into, identity).name
-        num_bytes = _checked_bytes(into / identity)
+        num_bytes = _checked_bytes(into)
         if not target.exists():  # otherwise it takes no additional space
             reservation.reserve(num_bytes)
+        self._adopt_images(reservation.owner, into / IMAGES_FOLDER)
         if store is None:
             self._register_scene(into, identity, target)
         else:
             store[0].adopt(target.parent, into / identity)
-        reservation.convert(store[2] if store else "scene", identity, num_bytes)
+        own_bytes = num_bytes if store is None else folder_bytes(target)
+        reservation.convert(store[2] if store else "scene", identity, own_bytes)
+
+    def _adopt_images(self, owner: str, folder: Path) -> None:
+        """Move the images of imported materials into place, and assign them to their owner."""
+        images = images_path(self._settings.data)
+        for path in IMAGES.paths(folder):
+            IMAGES.adopt(images, path)
+            self._quotas.assign_owner(owner, "image", path.name, folder_bytes(images / path.name))
 
     def _register_scene(self, into: Path, identity: str, target: Path) -> None:
         """Move a scene into place; an existing damaged one is replaced."""

@@ -29,7 +29,9 @@ _OUT_OF_MEMORY_MESSAGES = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
 SUMMARY = "summary.json"
 """File with the summary of a scene, next to its folder."""
-ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "tile"]
+IMAGES = "images"
+"""Folder with the images of imported materials, next to the material's."""
+ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "imported", "tile"]
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,8 @@ def _import(request: ImportRequest) -> str:
         return _import_image(request)
     if request.kind == "material":
         return _import_material(request)
+    if request.kind == "imported":
+        return _import_library_materials(request)
     if request.kind == "tile":
         return _look_at_tile(request)
     return _import_environment(request) if request.kind == "environment" else _import_scene(request)
@@ -170,6 +174,12 @@ def _import_material(request: ImportRequest) -> str:
     from relume.assets.measured.measured_store import store_material
 
     return store_material(Path(request.into), Path(request.file), request.name, request.scene or None).id
+
+
+def _import_library_materials(request: ImportRequest) -> str:
+    from relume.imported_materials.material_store import store_materials
+
+    return store_materials(Path(request.into), Path(request.into) / IMAGES, Path(request.file), request.name).id
 
 
 def _look_at_tile(request: ImportRequest) -> str:

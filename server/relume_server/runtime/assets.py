@@ -11,13 +11,15 @@ from relume.assets.btf.btf_store import STORE as BTFS
 from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
-from relume_worker.paths import btfs_path, environments_path, images_path, materials_path
+from relume.imported_materials.material_store import STORE as IMPORTED
+from relume_worker.paths import btfs_path, environments_path, images_path, imported_materials_path, materials_path
 
 
 def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
     """All asset stores with their folders."""
     return [
         (MATERIALS, materials_path(data_dir)),
+        (IMPORTED, imported_materials_path(data_dir)),
         (BTFS, btfs_path(data_dir)),
         (ENVIRONMENTS, environments_path(data_dir)),
         (IMAGES, images_path(data_dir)),

@@ -145,6 +145,27 @@ class MeasuredBody(Body):
     warnings: list[str]
 
 
+class LibraryMaterialBody(Body):
+    """One material of an imported file. `terms`: complete, with uploaded images as textures. `normal_map`, `glass`: as
+    in a look, null if it has none; `glass` applies to objects that are glass in the scene."""
+
+    name: str
+    terms: list[dict[str, Any]]
+    normal_map: dict[str, Any] | None
+    glass: dict[str, Any] | None
+    thumbnail: str
+
+
+class ImportedBody(Body):
+    """A file with materials. `warnings`: most severe first."""
+
+    id: str
+    name: str
+    created: str
+    materials: list[LibraryMaterialBody]
+    warnings: list[SceneWarning]
+
+
 class BtfBody(Body):
     """A BTF; looks refer to it by `data`, `terms` are its initial terms.
 

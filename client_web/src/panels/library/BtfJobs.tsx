@@ -12,7 +12,7 @@ import {
 } from "./libraryItems";
 import { deleteJob, GEOMETRIES, isRunning, isBeingMade, btfJobs, jobText, btfUploadProgress, stopJob } from "./btfJobs";
 
-export const MATERIAL_FILES = ".binary,.bsdf,.brdf,.zip,.btf";
+export const MATERIAL_FILES = ".binary,.bsdf,.brdf,.zip,.btf,.mtlx";
 const MESH_FILES = ".glb,.obj,.ply,.zip";
 
 function BtfJob({ work }: { work: BtfJobBody }) {
@@ -46,16 +46,9 @@ function ImageImport() {
   const label = fraction !== null && fraction < 1 ? `Uploading, ${Math.round(100 * fraction)} %` : "Factorizing…";
   return (
     <div class="library-import">
-      <input
-        ref={picker}
-        type="file"
-        accept={MATERIAL_FILES}
-        aria-label="Measured material"
-        hidden
-        onChange={onImport}
-      />
+      <input ref={picker} type="file" accept={MATERIAL_FILES} aria-label="Material file" hidden onChange={onImport} />
       <button disabled={fraction !== null} onClick={() => picker.current?.click()}>
-        Import measured material…
+        Import material…
       </button>
       {fraction !== null && <span role="status">{label}</span>}
     </div>

@@ -10,6 +10,7 @@ import { NavigationMap } from "./NavigationMap";
 import {
   BTFS,
   DRAG_TYPE,
+  IMPORTED,
   otherGroupMatches,
   fittedModels,
   group,
@@ -24,7 +25,7 @@ import {
   visibleEntries,
 } from "./libraryItems";
 
-const UNFITTED: Record<string, string> = { [MEASURED]: "Measurements", [BTFS]: "BTF textures" };
+const UNFITTED: Record<string, string> = { [IMPORTED]: "Imported", [MEASURED]: "Measurements", [BTFS]: "BTF textures" };
 
 const label = (name: string) => UNFITTED[name] ?? models.value.find((info) => info.model === name)?.label ?? name;
 
@@ -43,7 +44,7 @@ function Filters() {
         ))}
       </select>
       <select aria-label="Model" value={model.value} onChange={(event) => (model.value = event.currentTarget.value)}>
-        {[...fittedModels.value, MEASURED, BTFS].map((name) => (
+        {[...fittedModels.value, IMPORTED, MEASURED, BTFS].map((name) => (
           <option key={name} value={name}>
             {label(name)}
           </option>
@@ -81,7 +82,9 @@ export function LibraryPanel() {
         {selectedMaterial.value === null
           ? "Drag a ball onto an object, or select an object first."
           : `Click to apply to ${selectedMaterial.value} or drag onto an object.`}{" "}
-        Textures aren’t kept; re-add them under Texture.
+        {model.value === IMPORTED
+          ? "Imported materials bring their own textures."
+          : "Textures aren’t kept; re-add them under Texture."}
       </p>
       <NavigationMap />
       <input
@@ -105,6 +108,11 @@ export function LibraryPanel() {
             </button>
           ))}
         </div>
+      )}
+      {visibleEntries.value.length === 0 && query.value === "" && model.value === IMPORTED && (
+        <p class="library-help">
+          No imported materials yet. Import MaterialX: a .mtlx file, or a ZIP of it with its images.
+        </p>
       )}
       {visibleEntries.value.length === 0 && query.value === "" && model.value === MEASURED && (
         <p class="library-help">

@@ -1,10 +1,12 @@
 /** The library: fitted materials, imported measurements and BTFs, and applying one to an object. */
 import { computed, signal } from "@preact/signals";
 import { jsonPointer } from "../../state/document/pointer";
-import { editValue } from "../../edit/edit";
-import { listBtfs, listMaterials, listMeasured, materialThumbnailUrl } from "../../session/net/api";
-import { uploadMeasured } from "../../session/net/upload";
-import type { BtfBody, MaterialBody, MeasuredBody, Term } from "../../protocol";
+import { editValue, replaceLook } from "../../edit/edit";
+import { listBtfs, listImported, listMaterials, listMeasured, materialThumbnailUrl } from "../../session/net/api";
+import { uploadMaterials, uploadMeasured } from "../../session/net/upload";
+import type { BtfBody, ImportedBody, LibraryMaterialBody, MaterialBody, MeasuredBody, Term } from "../../protocol";
+import { MATERIALX_SUFFIX } from "../../start/files/sceneFiles";
+import { look } from "../../state/look";
 import { libraryOpen } from "../../state/panels";
 import { togglePanel } from "../../state/panelWidths";
 import { selectMaterial, selectedMaterial, selectedTerm, selectTerm } from "../../state/selection";
@@ -15,6 +17,8 @@ import { trackJobs, type Geometry, continueJob, importImages, makeFromMesh, gene
 export const DRAG_TYPE = "application/x-relume-material";
 /** Entry of the model filter for imported measurements. */
 export const MEASURED = "measured";
+/** Entry of the model filter for imported materials. */
+export const IMPORTED = "imported";
 /** Entry of the model filter for BTFs. */
 export const BTFS = "btfs";
 
@@ -25,7 +29,9 @@ interface LibraryEntry {
   description: string;
   thumbnail: string;
   terms: Term[];
-  /** Model of the fit, `MEASURED` or `BTFS`. */
+  /** The material with its textures, if it was imported. */
+  imported?: LibraryMaterialBody;
+  /** Model of the fit, `IMPORTED`, `MEASURED` or `BTFS`. */
   model: string;
   /** Category such as metal; unknown for measurements. */
   group: string | null;
@@ -33,6 +39,7 @@ interface LibraryEntry {
 
 export const library = signal<MaterialBody[]>([]);
 const measured = signal<MeasuredBody[]>([]);
+const imported = signal<ImportedBody[]>([]);
 const btfs = signal<BtfBody[]>([]);
 /** The search text: all its words must occur in an entry's name or description. */
 export const query = signal("");
@@ -63,6 +70,20 @@ function measuredEntry({ id, name, thumbnail, terms, warnings }: MeasuredBody): 
   return { id, name, description, thumbnail, terms, model: MEASURED, group: null };
 }
 
+function importedEntries({ id, name: file, materials, warnings }: ImportedBody): LibraryEntry[] {
+  const notes = warnings.map(({ text }) => ` Note: ${text}`).join("");
+  return materials.map((material, index) => ({
+    id: `${id}/${index}`,
+    name: material.name,
+    description: `${material.name} of ${file}.${notes}`,
+    thumbnail: material.thumbnail,
+    terms: material.terms,
+    imported: material,
+    model: IMPORTED,
+    group: null,
+  }));
+}
+
 function btfEntry({ id, name, thumbnail, terms, synthetic, size, error, memory_bytes }: BtfBody): LibraryEntry {
   const from = synthetic === null ? "measured" : "synthetic, rendered from geometry";
   const missed = (100 * (error.at(-1) ?? 0)).toFixed(1);
@@ -73,11 +94,12 @@ function btfEntry({ id, name, thumbnail, terms, synthetic, size, error, memory_b
 
 const entries = computed<LibraryEntry[]>(() => [
   ...library.value.map(fittedEntry),
+  ...imported.value.flatMap(importedEntries),
   ...measured.value.map(measuredEntry),
   ...btfs.value.map(btfEntry),
 ]);
-/** True if the listed entries have categories; measurements have none. */
-export const hasGroups = computed(() => model.value !== MEASURED && model.value !== BTFS);
+/** True if the listed entries have categories; only fitted materials do. */
+export const hasGroups = computed(() => ![IMPORTED, MEASURED, BTFS].includes(model.value));
 
 /** Entries of the selected model and category, one per material and source. */
 export const visibleEntries = computed<LibraryEntry[]>(() => {
@@ -119,7 +141,11 @@ export async function openLibrary(): Promise<void> {
   await reportErrors(async () => {
     await refreshBtfs(); // the command line may have created some
     if (library.value.length === 0)
-      [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
+      [library.value, measured.value, imported.value] = await Promise.all([
+        listMaterials(),
+        listMeasured(),
+        listImported(),
+      ]);
     if (libraryOpen.value) await trackJobs(refreshBtfs);
   });
 }
@@ -143,9 +169,20 @@ export const resumeJob = (id: string) => startJob(() => continueJob(id));
 
 const BTF_SUFFIXES = [".zip", ".btf"];
 
-/** A ZIP of images or a .btf file is a BTF, anything else a BRDF. */
+/** A ZIP lists its files at its end. */
+const ZIP_TAIL_BYTES = 1 << 20;
+
+async function isMaterialX(file: File): Promise<boolean> {
+  const name = file.name.toLowerCase();
+  if (!name.endsWith(".zip")) return name.endsWith(MATERIALX_SUFFIX);
+  return (await file.slice(-ZIP_TAIL_BYTES).text()).toLowerCase().includes(MATERIALX_SUFFIX);
+}
+
+/** A .mtlx file or a ZIP with one is MaterialX; a ZIP of images or a .btf file is a BTF, anything else a BRDF. */
 export async function importMaterial(file: File): Promise<void> {
-  if (BTF_SUFFIXES.some((suffix) => file.name.toLowerCase().endsWith(suffix))) await startJob(() => importImages(file));
+  if (await isMaterialX(file)) await importDocument(file);
+  else if (BTF_SUFFIXES.some((suffix) => file.name.toLowerCase().endsWith(suffix)))
+    await startJob(() => importImages(file));
   else await importMeasured(file);
 }
 
@@ -156,14 +193,30 @@ export async function importMaterials(files: readonly File[]): Promise<void> {
 }
 
 /** Import a measured BRDF and list it among the measurements. */
-async function importMeasured(file: File): Promise<void> {
+const importMeasured = (file: File) =>
+  upload(async (progress) => {
+    const { name, warnings } = await uploadMeasured(file, progress);
+    measured.value = await listMeasured();
+    model.value = MEASURED;
+    return [name, ...warnings];
+  });
+
+/** Import a MaterialX document and list its materials. */
+const importDocument = (file: File) =>
+  upload(async (progress) => {
+    const { name, warnings } = await uploadMaterials(file, progress);
+    imported.value = await listImported();
+    model.value = IMPORTED;
+    return [name, ...warnings.map(({ text }) => text)];
+  });
+
+/** Show the progress of an upload, then the material's name and its warnings. */
+async function upload(work: (progress: (fraction: number) => void) => Promise<string[]>): Promise<void> {
   await reportErrors(async () => {
     materialUploadProgress.value = 0;
     try {
-      const material = await uploadMeasured(file, (fraction) => (materialUploadProgress.value = fraction));
-      measured.value = await listMeasured();
-      model.value = MEASURED;
-      showNote([`“${material.name}” added to the library.`, ...material.warnings].join(" Note: "));
+      const [name, ...warnings] = await work((fraction) => (materialUploadProgress.value = fraction));
+      showNote([`“${name}” added to the library.`, ...warnings].join(" Note: "));
     } finally {
       materialUploadProgress.value = null;
     }
@@ -177,10 +230,23 @@ export function applyTerms(target: string, label: string, terms: readonly Term[]
   editValue(label, jsonPointer("materials", target, "terms"), bare);
 }
 
+/** Replace an object's material by an imported one, with its textures; only objects of glass get its glass. */
+export function applyImported(target: string, { name, terms, normal_map, glass }: LibraryMaterialBody): void {
+  const current = look.value?.materials[target];
+  if (look.value === null || current === undefined) return;
+  const material = { ...current, terms, normal_map };
+  if (current.glass && glass) {
+    const { color, roughness, ior } = glass;
+    material.glass = { ...current.glass, ...(current.glass.absorption && glass), color, roughness, ior };
+  }
+  replaceLook(name, { ...look.value, materials: { ...look.value.materials, [target]: material } });
+}
+
 export function applyEntry(target: string, id: string): void {
   const entry = entries.value.find((candidate) => candidate.id === id);
   if (entry === undefined) return;
-  applyTerms(target, entry.name, entry.terms);
+  if (entry.imported === undefined) applyTerms(target, entry.name, entry.terms);
+  else applyImported(target, entry.imported);
   selectMaterial(target);
   if (selectedTerm.value >= entry.terms.length) selectTerm(0); // the open term was replaced
 }

@@ -18,6 +18,7 @@ import type {
   MaterialMapBody,
   BtfBody,
   BtfJobBody,
+  ImportedBody,
   MeasuredBody,
   MetalnessBody,
   ModelBody,
@@ -135,6 +136,7 @@ export async function resumeBtfJob(id: string): Promise<void> {
 export async function deleteBtfJob(id: string): Promise<void> {
   await request(`${btfJobPath(id)}?delete_files=true`, { method: "DELETE" });
 }
+export const listImported = () => getJson<ImportedBody[]>("/api/materials/imported");
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
 /** Table of fits that a material map shows: Ngan 2005, as in Sun 2007, or Löw 2012. */
 export type MapTable = "ngan" | "low";

@@ -1,6 +1,6 @@
 /** Multipart uploads with progress, which fetch cannot report. */
 import type { DroppedFile } from "../../start/files/dropTypes";
-import type { BtfJobBody, EnvironmentBody, ImageBody, MeasuredBody, SceneBody } from "../../protocol";
+import type { BtfJobBody, EnvironmentBody, ImageBody, ImportedBody, MeasuredBody, SceneBody } from "../../protocol";
 import { ApiError } from "./api";
 
 export interface SceneUpload {
@@ -63,6 +63,13 @@ export function uploadMeasured(file: File, progress: (fraction: number) => void)
   const form = new FormData();
   form.append("material", file);
   return postForm("/api/materials/measured", form, progress) as Promise<MeasuredBody>;
+}
+
+/** Upload a MaterialX document, or a ZIP with one and its images. */
+export function uploadMaterials(file: File, progress: (fraction: number) => void): Promise<ImportedBody> {
+  const form = new FormData();
+  form.append("material", file);
+  return postForm("/api/materials/imported", form, progress) as Promise<ImportedBody>;
 }
 
 /** Upload a mesh of one repeat to render a BTF from; `period`: its width in meters if not the bounding box's. */

@@ -32,7 +32,7 @@ function listFileNames(files: readonly DroppedFile[]): string {
 }
 
 const MEASURED_MESSAGE =
-  "Open a scene and drop measured materials on the Library: MERL (.binary), RGL (.bsdf), Cornell (.brdf) or BTF (.btf, .zip).";
+  "Open a scene and drop materials on the Library: MaterialX (.mtlx, .zip), MERL (.binary), RGL (.bsdf), Cornell (.brdf) or BTF (.btf, .zip).";
 const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY or ZIP.";
 
 /** Advice for rejected files, by the type of the first. */

@@ -9,8 +9,9 @@ export const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp",
 /** Suffixes of companion files. */
 export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
 
-/** Measured materials, for the library; a .zip may be one, too. */
-export const MEASURED_SUFFIXES = [".binary", ".bsdf", ".brdf", ".btf"];
+/** Materials for the library; a .zip may be one, too. */
+export const MATERIALX_SUFFIX = ".mtlx";
+export const MEASURED_SUFFIXES = [".binary", ".bsdf", ".brdf", ".btf", MATERIALX_SUFFIX];
 
 export interface SceneFile extends DroppedFile {
   /** The files that the scene refers to. */

@@ -1,0 +1,1 @@
+"""MaterialX documents as materials: https://materialx.org. Read `import_document` first."""

@@ -1,0 +1,68 @@
+"""OpenPBR Surface 1.1: https://academysoftwarefoundation.github.io/OpenPBR."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from relume.scene_io.surfaces.layers import (
+    WHITE,
+    TransmissionLayer,
+    anisotropic_highlight,
+    coat_tint,
+    subsurface_base,
+    tinted,
+    warn_rough_diffuse,
+)
+from relume.scene_io.surfaces.surface_inputs import SurfaceInputs
+from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+
+_MAX_LUMINANCE = 1e9
+
+
+def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
+    """Convert the inputs of `open_pbr_surface`; the radiance of its emission is the luminance times the color."""
+    base = inputs.weighted_color(
+        "base_weight", inputs.scalar("base_weight", 1), inputs.color("base_color", (0.8, 0.8, 0.8))
+    )
+    base = subsurface_base(
+        inputs, base, inputs.number("subsurface_weight", 0), inputs.color("subsurface_color", (0.8, 0.8, 0.8))
+    )
+    warn_rough_diffuse(inputs, inputs.number("base_diffuse_roughness", 0))
+    coat = inputs.scalar("coat_weight", 0)
+    is_darkened = inputs.number("coat_darkening", 1) > 0
+    tint = coat_tint(inputs, coat, inputs.number("coat_ior", 1.6, 10), darkens=is_darkened)
+    transmission = TransmissionLayer.read(inputs, "transmission_weight", "geometry_thin_walled")
+    base = transmission.base(inputs, "transmission_weight", base)
+    roughness, anisotropy = anisotropic_highlight(inputs, 0.3, "specular_roughness_anisotropy", _widths)
+    return SurfaceParameters(
+        base_color=tinted(base, tint),
+        metallic=inputs.scalar("base_metalness", 0),
+        roughness=roughness,
+        specular=inputs.scalar("specular_weight", 1),
+        specular_color=tinted(inputs.color("specular_color", WHITE), tint),
+        ior=inputs.number("specular_ior", 1.5, 10),
+        anisotropy=anisotropy,
+        clearcoat=coat,
+        clearcoat_roughness=inputs.scalar("coat_roughness", 0),
+        sheen_color=inputs.weighted_color(
+            "fuzz_weight", inputs.scalar("fuzz_weight", 0), inputs.color("fuzz_color", WHITE)
+        ),
+        sheen_roughness=inputs.scalar("fuzz_roughness", 0.5),
+        transmission=transmission.weight,
+        thickness=transmission.thickness,
+        attenuation_distance=transmission.depth,
+        attenuation_color=transmission.inside,
+        emission=inputs.color("emission_color", WHITE),
+        emission_strength=inputs.number("emission_luminance", 0, _MAX_LUMINANCE),
+        alpha=inputs.scalar("geometry_opacity", 1),
+        alpha_mode="BLEND",
+        normal=inputs.normal("geometry_normal"),
+        iridescence=inputs.number("thin_film_weight", 0),
+        dispersion=inputs.number("transmission_dispersion_scale", 0) if transmission.weight else 0.0,
+    )
+
+
+def _widths(alpha: float, anisotropy: float) -> tuple[float, float]:
+    """α along and across the tangent."""
+    along = alpha * sqrt(2 / (1 + (1 - anisotropy) ** 2))
+    return along, (1 - anisotropy) * along
