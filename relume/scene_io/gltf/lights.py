@@ -11,13 +11,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.collect_lights import LightCollector
 from relume.scene.validate import MAX_METERS
 from relume.scene_io.gltf.document import Document, Factor, Index, Name, Node, Number
+from relume.scene_io.gltf.tolerant import GltfObjects, read_object
 
 F64 = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ class _Spot(BaseModel, frozen=True):
     """The half-angles of a spot's cone, radians."""
 
     innerConeAngle: Annotated[float, Field(ge=0, le=np.pi / 2, allow_inf_nan=False)] = 0.0  # noqa: N815
-    outerConeAngle: Annotated[float, Field(gt=0, le=np.pi / 2 + 1e-6, allow_inf_nan=False)] = np.pi / 4  # noqa: N815
+    outerConeAngle: Annotated[float, Field(gt=0, le=np.pi / 2, allow_inf_nan=False)] = np.pi / 4  # noqa: N815
 
 
 class _Punctual(BaseModel, frozen=True):
@@ -46,9 +47,9 @@ class _Punctual(BaseModel, frozen=True):
 
 
 class _PunctualLights(BaseModel, frozen=True):
-    """The extension at the document."""
+    """The extension at the document; its lights are unchecked."""
 
-    lights: Annotated[list[_Punctual], Field(max_length=_MAX_DEFINITIONS, fail_fast=True)] = []
+    lights: list[Any] = []
 
 
 class _LightReference(BaseModel, frozen=True):
@@ -63,25 +64,32 @@ class LightReader:
     def __init__(self, document: Document, collector: LightCollector, warnings: list[ImporterWarning]) -> None:
         self._collector = collector
         self._warnings = warnings
+        definitions: list[Any] = []
         try:
-            self._definitions = _PunctualLights.model_validate(document.extensions.get(EXTENSION, {})).lights
-        except (ValidationError, RecursionError):
-            raise SceneError(
-                f"{EXTENSION} of the file is invalid or has over {_MAX_DEFINITIONS:,} lights; export it again"
-            ) from None
+            content = document.root.extensions.get(EXTENSION, {})
+            definitions = read_object(_PunctualLights, content, f"{EXTENSION} of the file", warnings).lights
+        except SceneError as problem:
+            warnings.append(unsupported(f"Lights were left out: {problem}."))
+        if len(definitions) > _MAX_DEFINITIONS:
+            raise SceneError(f"the scene has more than {_MAX_DEFINITIONS:,} lights, the limit; remove some")
+        self._definitions = GltfObjects(_Punctual, definitions, "light", warnings)
 
-    def add(self, node: Node, to_world: Shaped[F64, "4 4"]) -> None:
+    def add(self, node: Node, label: str, to_world: Shaped[F64, "4 4"]) -> None:
         """Add the light of a node, if there is one; it emits along the node's −Z.
 
-        Raises:
-            SceneError: there is no such light, or there are more than a look can have.
+        Args:
+            node: from the document. label: names it in warnings. to_world: its transform.
         """
         if EXTENSION not in node.extensions:
             return
         try:
-            light = self._definitions[_LightReference.model_validate(node.extensions[EXTENSION]).light]
-        except (ValidationError, IndexError, RecursionError):
-            raise SceneError(f"node {quote(node.name)} refers to a missing light; export it again") from None
+            reference = read_object(
+                _LightReference, node.extensions[EXTENSION], f"the light of {label}", self._warnings
+            )
+            light = self._definitions.get(reference.light, label)
+        except SceneError as problem:
+            self._warnings.append(unsupported(f"A light was left out: {problem}."))
+            return
         name = self._collector.name(light.name or node.name or light.type)
         direction, position = -to_world[:3, 2], to_world[:3, 3]
         length = float(np.linalg.norm(direction))
