@@ -142,7 +142,7 @@ def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
 def _bytes(container: GltfContainer, view: BufferView | MeshoptBuffer, label: str) -> memoryview:
     """A slice of a buffer."""
     content = container.buffer(view.buffer, label)
-    if view.byteOffset + view.byteLength > len(content):
+    if view.byteOffset < 0 or view.byteOffset + view.byteLength > len(content):
         raise SceneError(f"the buffer view of {label} exceeds its buffer; export the scene again")
     return content[view.byteOffset : view.byteOffset + view.byteLength]
 
@@ -170,7 +170,7 @@ def _read_strided(
         raise SceneError(f"{label} have a stride of {stride} for elements of {element_bytes} bytes; export it again")
     if count == 0:
         return np.zeros((0, width), dtype)
-    if offset + (count - 1) * stride + element_bytes > len(content):
+    if offset < 0 or offset + (count - 1) * stride + element_bytes > len(content):
         raise SceneError(f"{label} have more elements than their buffer view; export the scene again")
     return np.ndarray((count, width), dtype, content, offset, (stride, dtype.itemsize)).copy()
 

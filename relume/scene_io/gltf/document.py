@@ -14,7 +14,7 @@ from relume.core.import_warnings import ImporterWarning
 from relume.scene_io.gltf.tolerant import GltfObjects
 
 MAX_COUNT = 2**32 - 1
-Index = Annotated[int, Field(ge=0, lt=2**31)]
+Index = int  # is checked when it is used
 Indices = Annotated[tuple[Index, ...], Field(max_length=100_000, fail_fast=True)]
 Bytes = Annotated[int, Field(ge=0, lt=2**40)]
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e30, le=1e30)]
@@ -45,20 +45,20 @@ class Buffer(GltfPrimitivePart):
 
 class BufferView(GltfPrimitivePart):
     buffer: Index
-    byteOffset: Bytes = 0  # noqa: N815
+    byteOffset: int = 0  # noqa: N815
     byteLength: Bytes  # noqa: N815
     byteStride: Bytes | None = None  # noqa: N815
 
 
 class SparseIndices(GltfPrimitivePart):
     bufferView: Index  # noqa: N815
-    byteOffset: Bytes = 0  # noqa: N815
+    byteOffset: int = 0  # noqa: N815
     componentType: Literal[5121, 5123, 5125]  # noqa: N815
 
 
 class SparseValues(GltfPrimitivePart):
     bufferView: Index  # noqa: N815
-    byteOffset: Bytes = 0  # noqa: N815
+    byteOffset: int = 0  # noqa: N815
 
 
 class Sparse(GltfPrimitivePart):
@@ -69,7 +69,7 @@ class Sparse(GltfPrimitivePart):
 
 class Accessor(GltfPrimitivePart):
     bufferView: Index | None = None  # noqa: N815
-    byteOffset: Bytes = 0  # noqa: N815
+    byteOffset: int = 0  # noqa: N815
     componentType: Literal[5120, 5121, 5122, 5123, 5125, 5126]  # noqa: N815
     normalized: bool = False
     count: Annotated[int, Field(ge=0, le=MAX_COUNT)]

@@ -44,6 +44,7 @@ from relume.scene_io.gltf.skins import joint_matrices, skin_geometry
 from relume.scene_io.gltf.unknown_extensions import warn_unknown_extensions
 from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
+from relume.scene_io.import_options import LightUnit
 from relume.scene_io.referenced_files import Companions, NoFiles
 
 F64 = NDArray[np.float64]
@@ -55,7 +56,11 @@ _MAX_SEPARATE_MESHES = 2_000  # beyond, meshes are merged by material: each has 
 
 
 def import_gltf(
-    data: bytes, name: str, environment: Environment | None = None, companions: Companions | None = None
+    data: bytes,
+    name: str,
+    environment: Environment | None = None,
+    companions: Companions | None = None,
+    light_unit: LightUnit = "file",
 ) -> Scene:
     """Import a .glb or .gltf file.
 
@@ -64,6 +69,7 @@ def import_gltf(
         name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: files that it may refer to; None for none.
+        light_unit: unit of its lights, see `relume.scene_io.import_options.ImportOptions`.
 
     Returns:
         The scene, with node transforms applied: one mesh per primitive and node, cameras or one view "front", lights
@@ -72,7 +78,7 @@ def import_gltf(
     Raises:
         SceneError: the file is unusable; the message says why and what to do.
     """
-    builder = _SceneBuilder(read_container(data, companions or NoFiles(), []))
+    builder = _SceneBuilder(read_container(data, companions or NoFiles(), []), light_unit)
     materials = [read_material.material for read_material in builder.materials]
     contents = (name, builder.meshes, materials, builder.cameras, environment or studio())
     return finalize(*contents, builder.warnings, builder.variants, builder.lights)
@@ -99,13 +105,13 @@ class _BoundPrimitive(NamedTuple):
 class _SceneBuilder:
     """Builds the scene of one file: walks the nodes, and reads meshes and materials on first use."""
 
-    def __init__(self, container: GltfContainer) -> None:
+    def __init__(self, container: GltfContainer, light_unit: LightUnit) -> None:
         self._document = container.document
         self._accessors = AccessorReader(container)
         self.warnings = container.warnings
         self._material_reader = MaterialReader(ImageReader(container, self.warnings), self.warnings)
         self._collector = LightCollector(self.warnings)
-        self._light_reader = LightReader(container.document, self._collector, self.warnings)
+        self._light_reader = LightReader(container.document, self._collector, light_unit, self.warnings)
         self._geometry: dict[PrimitiveKey, GltfGeometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
         self._nodes = place_nodes(self._document, self._scene_roots(), self.warnings)
@@ -139,6 +145,7 @@ class _SceneBuilder:
         scene_materials = [read_material.material for read_material in self.materials]
         lit = self._collector.emissive_light(scene_materials, emissions, self.meshes)
         self.materials = [replace(u, material=material) for u, material in zip(self.materials, lit, strict=True)]
+        self._light_reader.warn_dim_lights(self._document.root.asset.generator)
         self.lights = self._collector.lights
         self.variants = self._read_variants()
         self._material_reader.warn_occlusion_maps()

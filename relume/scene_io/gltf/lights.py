@@ -1,7 +1,8 @@
 """KHR_lights_punctual as the scene's local lights.
 
 The extension uses photometric units, candela and lux, and relume radiometric ones. Exporters that work in watts
-multiply by 683 lm/W, the luminous efficacy of green light at 555 nm; this divides by it.
+multiply by 683 lm/W, the luminous efficacy of green light at 555 nm; this divides by it. Others write watts as they
+are, which the file does not say: see `relume.scene_io.import_options.ImportOptions`.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from relume.scene.collect_lights import LightCollector
 from relume.scene.validate import MAX_METERS
 from relume.scene_io.gltf.document import Document, Factor, Index, Name, Node, Number
 from relume.scene_io.gltf.tolerant import GltfObjects, read_object
+from relume.scene_io.import_options import LightUnit
 
 F64 = NDArray[np.float64]
 
 EXTENSION = "KHR_lights_punctual"
 LUMENS_PER_WATT = 683.0
+_DIM = 20.0  # candela: a lamp of 3 W in watts, or one of 250 W if the file has W/sr
 _MAX_DEFINITIONS = 10_000
 _UNITS = approximated(f"Light strengths converted from candela/lux to watts ({LUMENS_PER_WATT:g} lm/W).")
 
@@ -61,9 +64,11 @@ class _LightReference(BaseModel, frozen=True):
 class LightReader:
     """Reads the lights of one file's nodes."""
 
-    def __init__(self, document: Document, collector: LightCollector, warnings: list[ImporterWarning]) -> None:
-        self._collector = collector
-        self._warnings = warnings
+    def __init__(
+        self, document: Document, collector: LightCollector, unit: LightUnit, warnings: list[ImporterWarning]
+    ) -> None:
+        self._collector, self._unit, self._warnings = collector, unit, warnings
+        self._intensities: list[float] = []  # of point and spot lights, as in the file
         definitions: list[Any] = []
         try:
             content = document.root.extensions.get(EXTENSION, {})
@@ -107,5 +112,23 @@ class LightReader:
             fields["cone"] = [min(float(np.degrees(light.spot.innerConeAngle)), outer), outer]
         if light.range is not None:
             self._warnings.append(approximated(f"The range of light {quote(name)} is ignored; it reaches everywhere."))
-        self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
-        self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_PER_WATT)
+        if self._unit == "file" and _UNITS not in self._warnings:
+            self._warnings.append(_UNITS)
+        if light.type != "directional":
+            self._intensities.append(light.intensity)
+        self._collector.add(name, fields, np.array(light.color) * light.intensity / self._divisor(light.type))
+
+    def _divisor(self, kind: str) -> float:
+        """Strength in the file over W/sr, or W/m² of a directional light; Blender counts a spot as its whole sphere."""
+        power = 1.0 if kind == "directional" else 4 * np.pi
+        return {"file": LUMENS_PER_WATT, "W/sr": 1.0, "W": power}[self._unit]
+
+    def warn_dim_lights(self, generator: str) -> None:
+        """Warn if all lights are so dim that their unit is hardly candela."""
+        brightest = max(self._intensities, default=0.0)
+        if self._unit == "file" and 0 < brightest < _DIM:
+            author = f", by {quote(generator)}," if generator else ""
+            message = (
+                f"The brightest light of the file{author} has {brightest:.3g} candela: if all are too dark, import"
+            )
+            self._warnings.append(unsupported(f"{message} with the light unit W/sr, or W."))

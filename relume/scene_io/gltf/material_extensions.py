@@ -23,7 +23,7 @@ Weights = Annotated[list[Weight], Field(min_length=3, max_length=3)]
 class Ior(BaseModel, frozen=True):
     """KHR_materials_ior; 0 means a mirror."""
 
-    ior: Weight = 1.5
+    ior: Annotated[float, Field(allow_inf_nan=False, gt=-1e-6, le=1e6)] = 1.5
 
 
 class Specular(BaseModel, frozen=True):

@@ -55,11 +55,12 @@ class GltfObjects(Generic[M]):
 
     def used(self) -> list[tuple[str, Any]]:
         """Return label and JSON of each object that was read."""
-        return [(self.label(index), self._items[index]) for index in self._objects if index < len(self._items)]
+        return [(self.label(index), self._items[index]) for index in self._objects if 0 <= index < len(self._items)]
 
     def _read(self, index: int, label: str) -> M | SceneError:
         if not 0 <= index < len(self._items):
-            return SceneError(f"{label} refers to {self._kind} {index} of {len(self._items)}; export the scene again")
+            number = str(index)[:20]
+            return SceneError(f"{label} refers to {self._kind} {number} of {len(self._items)}; export the scene again")
         try:
             return read_object(self._model, self._items[index], self.label(index), self._warnings)
         except SceneError as problem:
@@ -67,8 +68,9 @@ class GltfObjects(Generic[M]):
 
     def label(self, index: int) -> str:
         """Name an object in messages: by its name in the file, or its index."""
-        name = self._items[index].get("name") if isinstance(self._items[index], dict) else None
-        return f"{self._kind} {quote(name)}" if isinstance(name, str) and name else f"{self._kind} {index}"
+        item = self._items[index] if 0 <= index < len(self._items) else None
+        name = item.get("name") if isinstance(item, dict) else None
+        return f"{self._kind} {quote(name)}" if isinstance(name, str) and name else f"{self._kind} {str(index)[:20]}"
 
 
 def read_object(model: type[M], content: Any, label: str, warnings: list[ImporterWarning]) -> M:

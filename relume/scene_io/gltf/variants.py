@@ -97,7 +97,7 @@ def variant_looks(
     looks: dict[str, dict[str, Any]] = {name: {"materials": {}} for name in names}
     for target, choices in scene_materials:
         for variant, index in choices:
-            if variant < len(names):
+            if 0 <= variant < len(names):
                 terms = _variant_terms(target, variant_materials[index], names[variant], warnings)
                 looks[names[variant]]["materials"][target.material.name] = {"terms": terms}
     return looks
