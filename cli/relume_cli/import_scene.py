@@ -53,8 +53,8 @@ def import_scene(
     """Import a scene; print its id.
 
     Prints a warning for each feature that was not read: "unsupported" is missing or differs from the file,
-    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter and --light-unit are
-    remembered: the next import of a scene with this name has them unless others are given.
+    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter and --light-unit
+    are remembered: the next import of a scene with this name has them unless others are given.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings

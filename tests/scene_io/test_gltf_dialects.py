@@ -211,7 +211,7 @@ def test_an_unreadable_normal_map_leaves_the_other_images() -> None:
 def test_deep_trees_are_shown() -> None:
     glb = Glb().quad()
     glb.document["nodes"] = [{"children": [k + 1], "translation": [0, 0, 1]} for k in range(500)] + [{"mesh": 0}]
-    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + [0, 0, 500])
+    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + np.array([0, 0, 500]))
 
 
 def test_nodes_that_cannot_be_placed_are_left_out() -> None:

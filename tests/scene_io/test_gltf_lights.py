@@ -165,7 +165,28 @@ def test_other_lights_of_a_file_remain() -> None:
 def test_numbers_of_lights_out_of_range_are_clamped_or_default(light: dict[str, Any], name: str, value: Any) -> None:
     scene = imported(with_lights([light]))
     np.testing.assert_allclose(scene.lights[0].fields[name], value)
-    assert len(scene.warnings) == 2  # one about the unit
+    assert len([warning for warning in scene.warnings if "light 0" in warning]) == 1
+
+
+@pytest.mark.parametrize(
+    ("unit", "point", "sun"), [("file", 100 / 683, 10 / 683), ("W/sr", 100, 10), ("W", 25 / np.pi, 10)]
+)
+def test_lights_have_the_unit_that_is_given(unit: Any, point: float, sun: float) -> None:
+    """100 W of a point light are 7.96 W/sr."""
+    glb = with_lights([{"type": "point", "intensity": 100}, {"type": "directional", "intensity": 10}])
+    scene = import_gltf(glb.bytes(), "lights", LIGHT, light_unit=unit)
+    np.testing.assert_allclose([light.fields["emission"][0] for light in scene.lights], [point, sun], rtol=1e-6)
+    assert len(scene.warnings) == (unit == "file")
+
+
+@pytest.mark.parametrize(("intensity", "num_warnings"), [(7.96, 1), (5435.0, 0)])
+def test_lights_that_are_dim_for_candela_give_a_warning(intensity: float, num_warnings: int) -> None:
+    """A point light of 100 W, as Blender exports it without and with units."""
+    glb = with_lights([{"type": "point", "intensity": intensity}])
+    glb.document["asset"]["generator"] = "Blender I/O"
+    warnings = [warning for warning in imported(glb).warnings if "light unit" in warning]
+    assert len(warnings) == num_warnings
+    assert all("“Blender I/O”" in warning and "7.96 candela" in warning for warning in warnings)
 
 
 def test_too_many_definitions_are_rejected() -> None:

@@ -77,14 +77,14 @@ def test_joints_outside_the_scene_are_used() -> None:
     glb = skinned([{"translation": [0, 1, 0]}])
     glb.document["nodes"].append({"children": [1], "translation": [0, 0, 7]})
     glb.document["scenes"] = [{"nodes": [0]}]
-    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + [0, 1, 7])
+    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + np.array([0, 1, 7]))
 
 
 def test_a_skin_that_cannot_be_read_shows_the_mesh_at_its_node() -> None:
     glb = skinned([{}])
     glb.document["skins"][0]["joints"] = [9]
     scene = imported(glb)
-    np.testing.assert_allclose(scene.meshes[0].positions, QUAD + [100, 0, 0])
+    np.testing.assert_allclose(scene.meshes[0].positions, QUAD + np.array([100, 0, 0]))
     assert any("A skin was left out" in warning for warning in scene.warnings)
 
 
@@ -112,7 +112,7 @@ def test_the_default_weights_of_a_mesh_morph_it() -> None:
     glb = morphed()
     glb.document["meshes"][0]["weights"] = [1, 0]
     scene = imported(glb)
-    np.testing.assert_allclose(scene.meshes[0].positions, QUAD + [0, 0, 3])
+    np.testing.assert_allclose(scene.meshes[0].positions, QUAD + np.array([0, 0, 3]))
     assert scene.warnings == ()
 
 
@@ -123,7 +123,8 @@ def test_weights_of_a_node_override_those_of_its_mesh() -> None:
     glb.document["scenes"][0]["nodes"] += [1, 2]
     lifted, mixed, plain = imported(glb).meshes
     np.testing.assert_allclose(lifted.positions[:, 2], 3)
-    np.testing.assert_allclose(mixed.positions, QUAD + [[0, 0, 1.5], [0, 0, 1.5], [1, 1, 1.5], [0, 0, 1.5]])
+    displacements = np.array([[0, 0, 1.5], [0, 0, 1.5], [1, 1, 1.5], [0, 0, 1.5]])
+    np.testing.assert_allclose(mixed.positions, QUAD + displacements)
     np.testing.assert_allclose(mixed.normals, np.tile(np.sqrt([0.5, 0, 0.5]), (4, 1)), atol=1e-6)
     np.testing.assert_allclose(plain.positions, QUAD)
 
@@ -133,7 +134,7 @@ def test_targets_that_do_not_fit_are_left_out() -> None:
     glb.document["meshes"][0]["weights"] = [1, 1]
     glb.document["meshes"][0]["primitives"][0]["targets"][1] = {"POSITION": glb.accessor(QUAD[:2])}
     scene = imported(glb)
-    np.testing.assert_allclose(scene.meshes[0].positions, QUAD + [0, 0, 3])
+    np.testing.assert_allclose(scene.meshes[0].positions, QUAD + np.array([0, 0, 3]))
     assert any("2 displacements" in warning for warning in scene.warnings)
 
 
@@ -142,7 +143,7 @@ def test_displacements_without_data_are_zero() -> None:
     glb.document["meshes"][0]["weights"] = [1, 1]
     glb.document["accessors"].append({"count": 4, "componentType": 5126, "type": "VEC3"})
     glb.document["meshes"][0]["primitives"][0]["targets"][1] = {"POSITION": len(glb.document["accessors"]) - 1}
-    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + [0, 0, 3])
+    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + np.array([0, 0, 3]))
 
 
 def test_morphing_precedes_skinning() -> None:
@@ -150,4 +151,5 @@ def test_morphing_precedes_skinning() -> None:
     lift = glb.accessor(np.tile(np.array([[0, 0, 3]], np.float32), (4, 1)))
     glb.document["meshes"][0] |= {"weights": [1]}
     glb.document["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": lift}]
-    np.testing.assert_allclose(imported(glb).meshes[0].positions, (QUAD + [0, 0, 3]) * 2 + [0, 5, 0], atol=1e-6)
+    expected = (QUAD + np.array([0, 0, 3])) * 2 + np.array([0, 5, 0])
+    np.testing.assert_allclose(imported(glb).meshes[0].positions, expected, atol=1e-6)

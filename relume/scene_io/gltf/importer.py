@@ -173,7 +173,7 @@ class _SceneBuilder:
         if not used:
             return {}
         everywhere = place_nodes(self._document, all_roots(self._document), [])  # joints may be in no scene
-        transforms = {placed.index: placed.to_world for placed in (*everywhere, *self._nodes)}
+        transforms = {placed.number: placed.to_world for placed in (*everywhere, *self._nodes)}
         skins = {}
         for index in used:
             try:
@@ -228,7 +228,7 @@ class _SceneBuilder:
             self._add_camera(node, placed.to_world)
         if not placed.is_visible:
             return
-        self._light_reader.add(node, self._document.nodes.label(placed.index), placed.to_world)
+        self._light_reader.add(node, self._document.nodes.label(placed.number), placed.to_world)
         keys = self._keys(placed)
         if node.mesh is None or not keys:
             return

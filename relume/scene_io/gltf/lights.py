@@ -119,7 +119,7 @@ class LightReader:
         self._collector.add(name, fields, np.array(light.color) * light.intensity / self._divisor(light.type))
 
     def _divisor(self, kind: str) -> float:
-        """Strength in the file over W/sr, or W/m² of a directional light; Blender counts a spot as its whole sphere."""
+        """Strength in the file over W/sr, or W/m² of a directional light; a spot's power is that of a point light."""
         power = 1.0 if kind == "directional" else 4 * np.pi
         return {"file": LUMENS_PER_WATT, "W/sr": 1.0, "W": power}[self._unit]
 

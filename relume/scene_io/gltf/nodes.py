@@ -26,10 +26,10 @@ class PlacedNode(NamedTuple):
     """A node of a scene.
 
     Attributes:
-        index: index in the file. to_world: (4, 4). is_visible: False if the node or an ancestor is hidden.
+        number: index in the file. to_world: (4, 4). is_visible: False if the node or an ancestor is hidden.
     """
 
-    index: int
+    number: int
     node: Node
     to_world: Shaped[F64, "4 4"]
     is_visible: bool
