@@ -47,26 +47,29 @@ def import_scene(
     light_unit: Annotated[
         LightUnit | None, typer.Option(help="Unit of the file's lights. [default: as the format says]")
     ] = None,
+    scene_name: Annotated[
+        str | None, typer.Option(help="Name or number of the scene, of a glTF file with several.")
+    ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Import a scene; print its id.
 
     Prints a warning for each feature that was not read: "unsupported" is missing or differs from the file,
-    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter and --light-unit
-    are remembered: the next import of a scene with this name has them unless others are given.
+    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter, --light-unit
+    and --scene-name are remembered: the next import of a scene with this name has them unless others are given.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.terminal.documents import scene_document
     from relume_worker.scenes import get_scene, register_scene
 
-    options_given = {"up": up, "unit": unit, "recenter": recenter, "light_unit": light_unit}
+    options_given = {"up": up, "unit": unit, "recenter": recenter, "light_unit": light_unit, "scene_name": scene_name}
     given = {key: value for key, value in options_given.items() if value is not None}
     if built_in is not None and given:
         from relume.core.errors import ParameterError
 
-        raise ParameterError("--built-in", built_in, "it without --up, --unit, --recenter and --light-unit")
+        raise ParameterError("--built-in", built_in, "it without the options of files")
     service = open_bakes(open_settings(data))
     try:
         options = None if built_in or file is None else _options(service.ledger, name or file.stem, given)

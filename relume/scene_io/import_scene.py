@@ -58,7 +58,7 @@ def _read(
     if data.removeprefix(codecs.BOM_UTF8).startswith(b"ply"):
         return import_ply(data, name, environment, companions, recenter)
     if data.startswith(b"glTF") or data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
-        return import_gltf(data, name, environment, companions, options.light_unit)
+        return import_gltf(data, name, environment, companions, options)
     if b"\0" not in data[:4_096] and OBJ_LINE.search(data[: 1 << 20]):
         return import_obj(data, name, environment, companions, recenter)
     if is_stl(data):

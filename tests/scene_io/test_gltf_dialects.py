@@ -18,6 +18,7 @@ from relume.assets.environments.environment import Environment
 from relume.core.errors import SceneError
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
+from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.import_scene import import_scene
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
@@ -230,6 +231,19 @@ def test_all_nodes_are_shown_if_the_scene_is_missing_or_empty(scenes: dict[str, 
     scene = imported(glb)
     np.testing.assert_array_equal(scene.meshes[0].positions, QUAD)
     assert any("All nodes are shown" in warning for warning in scene.warnings)
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "severity"), [("", 1, "ignored"), ("Second", 2, None), ("2", 3, None), ("No", 1, "unsupported")]
+)
+def test_a_scene_of_several_is_read(name: str, x: float, severity: str | None) -> None:
+    glb = Glb().quad()
+    glb.document["nodes"] = [{"mesh": 0, "translation": [k, 0, 0]} for k in range(4)]
+    glb.document |= {"scene": 1, "scenes": [{"nodes": [0]}, {"nodes": [1]}, {"nodes": [3]}, {"nodes": [2]}]}
+    glb.document["scenes"][3]["name"] = "Second"
+    scene = import_gltf(glb.bytes(), "test", LIGHT, options=ImportOptions(scene_name=name))
+    assert [mesh.positions[0, 0] for mesh in scene.meshes] == [x]
+    assert [warning.severity for warning in scene.warnings] == ([severity] if severity else [])
 
 
 def test_hidden_nodes_and_their_children_are_left_out() -> None:

@@ -14,6 +14,7 @@ from relume.core.errors import SceneError
 from relume.look import default_look
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
+from relume.scene_io.import_options import ImportOptions
 
 LIGHT = Environment("gray", np.ones((4, 8, 3), np.float32))
 
@@ -174,7 +175,7 @@ def test_numbers_of_lights_out_of_range_are_clamped_or_default(light: dict[str, 
 def test_lights_have_the_unit_that_is_given(unit: Any, point: float, sun: float) -> None:
     """100 W of a point light are 7.96 W/sr."""
     glb = with_lights([{"type": "point", "intensity": 100}, {"type": "directional", "intensity": 10}])
-    scene = import_gltf(glb.bytes(), "lights", LIGHT, light_unit=unit)
+    scene = import_gltf(glb.bytes(), "lights", LIGHT, options=ImportOptions(light_unit=unit))
     np.testing.assert_allclose([light.fields["emission"][0] for light in scene.lights], [point, sun], rtol=1e-6)
     assert len(scene.warnings) == (unit == "file")
 

@@ -58,7 +58,8 @@ class MetallicBlend:
     def _transmittance(self, rows: slice) -> F32:
         """1 − R of texels. (rows, width or 1, 1)"""
         weight = np.float32(self.specular) * _unit_values(self.raster.channel("specular", 3), rows)
-        return np.float32(1) - dielectric_reflectance(self._dielectric_f0(rows).max(axis=-1, keepdims=True), weight)
+        f0 = self._dielectric_f0(rows).max(axis=-1, keepdims=True)
+        return np.asarray(1 - dielectric_reflectance(f0, weight), np.float32)
 
     def diffuse(self) -> Texture:
         """Texture that multiplies the diffuse color."""

@@ -51,13 +51,16 @@ class GltfGeometry:
     def split_vertices(self) -> GltfGeometry:
         """Return a copy with separate vertices for each triangle."""
         order = self.faces.reshape(-1)
-        return GltfGeometry(
-            self.positions[order],
-            self.normals[order],
-            self.tangents[order],
-            {number: uvs[order] for number, uvs in self.uvs.items()},
-            np.arange(len(order), dtype=np.uint32).reshape(-1, 3),
-            *(None if values is None else values[order] for values in (self.colors, self.joints, self.joint_weights)),
+        return replace(
+            self,
+            positions=self.positions[order],
+            normals=self.normals[order],
+            tangents=self.tangents[order],
+            uvs={number: uvs[order] for number, uvs in self.uvs.items()},
+            faces=np.arange(len(order), dtype=np.uint32).reshape(-1, 3),
+            colors=None if self.colors is None else self.colors[order],
+            joints=None if self.joints is None else self.joints[order],
+            joint_weights=None if self.joint_weights is None else self.joint_weights[order],
         )
 
     def with_corner_uvs(self, uvs: Shaped[F32, "triangles 3 2"]) -> GltfGeometry:

@@ -44,7 +44,7 @@ from relume.scene_io.gltf.skins import joint_matrices, skin_geometry
 from relume.scene_io.gltf.unknown_extensions import warn_unknown_extensions
 from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
-from relume.scene_io.import_options import LightUnit
+from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.referenced_files import Companions, NoFiles
 
 F64 = NDArray[np.float64]
@@ -60,7 +60,7 @@ def import_gltf(
     name: str,
     environment: Environment | None = None,
     companions: Companions | None = None,
-    light_unit: LightUnit = "file",
+    options: ImportOptions | None = None,
 ) -> Scene:
     """Import a .glb or .gltf file.
 
@@ -69,7 +69,7 @@ def import_gltf(
         name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: files that it may refer to; None for none.
-        light_unit: unit of its lights, see `relume.scene_io.import_options.ImportOptions`.
+        options: `light_unit` and `scene_name`; None for the defaults.
 
     Returns:
         The scene, with node transforms applied: one mesh per primitive and node, cameras or one view "front", lights
@@ -78,7 +78,7 @@ def import_gltf(
     Raises:
         SceneError: the file is unusable; the message says why and what to do.
     """
-    builder = _SceneBuilder(read_container(data, companions or NoFiles(), []), light_unit)
+    builder = _SceneBuilder(read_container(data, companions or NoFiles(), []), options or ImportOptions())
     materials = [read_material.material for read_material in builder.materials]
     contents = (name, builder.meshes, materials, builder.cameras, environment or studio())
     return finalize(*contents, builder.warnings, builder.variants, builder.lights)
@@ -105,16 +105,16 @@ class _BoundPrimitive(NamedTuple):
 class _SceneBuilder:
     """Builds the scene of one file: walks the nodes, and reads meshes and materials on first use."""
 
-    def __init__(self, container: GltfContainer, light_unit: LightUnit) -> None:
+    def __init__(self, container: GltfContainer, options: ImportOptions) -> None:
         self._document = container.document
         self._accessors = AccessorReader(container)
         self.warnings = container.warnings
         self._material_reader = MaterialReader(ImageReader(container, self.warnings), self.warnings)
         self._collector = LightCollector(self.warnings)
-        self._light_reader = LightReader(container.document, self._collector, light_unit, self.warnings)
+        self._light_reader = LightReader(container.document, self._collector, options.light_unit, self.warnings)
         self._geometry: dict[PrimitiveKey, GltfGeometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
-        self._nodes = place_nodes(self._document, self._scene_roots(), self.warnings)
+        self._nodes = place_nodes(self._document, self._scene_roots(options.scene_name), self.warnings)
         self._skins = self._read_skins()
         self._choices: dict[PrimitiveKey, Choices] = {}
         self._primitives: dict[tuple[int | None, Choices], list[PrimitiveKey]] = {}
@@ -153,19 +153,33 @@ class _SceneBuilder:
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
 
-    def _scene_roots(self) -> Sequence[int]:
-        """Root nodes of the default scene; all root nodes if it is missing or empty."""
+    def _scene_roots(self, scene_name: str) -> Sequence[int]:
+        """Root nodes of the scene with that name, or else of the default one; all roots if it is missing or empty."""
         document = self._document
         if not len(document.scenes):
             return all_roots(document)
         try:
-            nodes = document.scenes.get(document.root.scene or 0, "the file").nodes
+            nodes = document.scenes.get(self._scene_index(scene_name), "the file").nodes
         except SceneError as problem:
             self.warnings.append(unsupported(f"All nodes are shown: {problem}."))
             return all_roots(document)
         if not nodes and len(document.nodes):
             self.warnings.append(unsupported("All nodes are shown: the scene of the file is empty."))
         return nodes or all_roots(document)
+
+    def _scene_index(self, name: str) -> int:
+        """Index of the scene with that name or number, or else of the default one."""
+        scenes = self._document.root.scenes
+        names = [str(scene.get("name", "")) if isinstance(scene, dict) else "" for scene in scenes]
+        keys = {str(number): number for number in range(len(names))}
+        keys |= {key: number for number, key in reversed([*enumerate(names)]) if key}
+        index = keys.get(name, self._document.root.scene or 0)
+        if len(names) > 1 and not name:
+            others = ", ".join(quote(key or str(number)) for number, key in enumerate(names[:10]) if number != index)
+            self.warnings.append(ignored(f"The file has {len(names):,} scenes; the default is shown, not {others}."))
+        if name and name not in keys:
+            self.warnings.append(unsupported(f"The file has no scene {quote(name)}; its default scene is shown."))
+        return index
 
     def _read_skins(self) -> dict[int, Shaped[F64, "joints 4 4"]]:
         """Matrices of the skins that are used; a skin that cannot be read is missing, with a warning."""
@@ -416,7 +430,7 @@ class _SceneBuilder:
 def _list_faults(warnings: Sequence[ImporterWarning]) -> str:
     """The faults of a file in brackets, as many as fit into an error."""
     faults = [str(warning).rstrip(".") for warning in warnings if warning.severity == "unsupported"]
-    total, listed = 0, []
+    total, listed = 0, list[str]()
     for fault in faults:
         total += len(fault)
         if total <= _MAX_FAULTS or not listed:

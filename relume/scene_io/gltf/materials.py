@@ -293,7 +293,7 @@ class MaterialReader:
         sheen_roughness = sheen.sheenRoughnessFactor
         if sheen.sheenRoughnessTexture is not None:
             sheen_roughness *= self._mean(sheen.sheenRoughnessTexture, 3, f"sheen roughness texture of {label}")
-        fuzz_weight = self._mean(extensions.fuzz and extensions.fuzz.fuzzTexture, 0, f"fuzz texture of {label}")
+        fuzz_weight = self._mean(extensions.fuzz.fuzzTexture, 0, f"fuzz texture of {label}") if extensions.fuzz else 1.0
         tint = (
             fuzz_weight
             * np.array(sheen.sheenColorFactor)
