@@ -1,4 +1,4 @@
-"""Skins and morph targets of glTF files at rest, by the specification's formulas."""
+"""Skins and morph targets of glTF files in the rest pose, by the specification's formulas."""
 
 from __future__ import annotations
 

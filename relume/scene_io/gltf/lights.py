@@ -26,7 +26,7 @@ F64 = NDArray[np.float64]
 
 EXTENSION = "KHR_lights_punctual"
 LUMENS_PER_WATT = 683.0
-_DIM = 20.0  # candela: a lamp of 3 W in watts, or one of 250 W if the file has W/sr
+_DIM = 20.0  # candela: 0.4 W in a file in candela, 250 W in one in W/sr
 _MAX_DEFINITIONS = 10_000
 _UNITS = approximated(f"Light strengths converted from candela/lux to watts ({LUMENS_PER_WATT:g} lm/W).")
 

@@ -1,4 +1,4 @@
-"""Linear blend skinning at rest: vertices follow their joints, not their node.
+"""Linear blend skinning in the rest pose: vertices follow their joints, not their node.
 
     v' = Σ w_j G_j B_j v    with the world transform G_j and the inverse bind matrix B_j of joint j
 

@@ -28,7 +28,7 @@ NOT_VISIBLE = (
     *("KHR_xmp", "KHR_animation", "KHR_audio", "KHR_physics", "KHR_interactivity", "KHR_node_", "OMI_", "VRM"),
     *("EXT_structural", "EXT_mesh_features", "EXT_instance_features", "MSFT_audio", "FB_ngon_encoding"),
 )
-"""Starts of the names of extensions that do not change the image at rest."""
+"""Starts of the names of extensions that do not change the image of the rest pose."""
 
 
 def warn_unknown_extensions(document: Document, warnings: list[ImporterWarning]) -> None:
