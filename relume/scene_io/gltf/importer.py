@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
@@ -17,7 +16,7 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.merge_meshes import merge_by_material
-from relume.scene.model import F32, Camera, Mesh, Scene
+from relume.scene.model import Camera, Mesh, Scene
 from relume.scene.textured_vertex_colors import TexturedColors, draw_textured_colors
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
@@ -26,24 +25,21 @@ from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.cameras import framing_camera, make_slug, rigid_frame
 from relume.scene_io.gltf.container import GltfContainer, read_container
 from relume.scene_io.gltf.degenerate_transforms import (
-    cofactors,
     count_dimensions,
-    determinant,
-    plane_normal,
-    remove_degenerate,
 )
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import Node, Primitive
-from relume.scene_io.gltf.geometry import MAX_COORDINATE, GltfGeometry, count_corners, read_primitive
+from relume.scene_io.gltf.geometry import GltfGeometry, count_corners, read_primitive
 from relume.scene_io.gltf.images import ImageReader
 from relume.scene_io.gltf.instances import read_instances
 from relume.scene_io.gltf.lights import LightReader
 from relume.scene_io.gltf.materials import WHITE, MaterialReader, ReadMaterial, TextureLayout, VertexColors
-from relume.scene_io.gltf.nodes import PlacedNode, all_roots, place_nodes
-from relume.scene_io.gltf.skins import joint_matrices, skin_geometry
+from relume.scene_io.gltf.nodes import PlacedNode, place_nodes, scene_roots
+from relume.scene_io.gltf.skins import read_skins, skin_geometry
 from relume.scene_io.gltf.unknown_extensions import warn_unknown_extensions
-from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
+from relume.scene_io.gltf.uvs import compute_tangents
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
+from relume.scene_io.gltf.world_mesh import BoundPrimitive, make_world_mesh
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.referenced_files import Companions, NoFiles
 
@@ -93,15 +89,6 @@ class PrimitiveKey(NamedTuple):
     skin: int | None
 
 
-class _BoundPrimitive(NamedTuple):
-    """A primitive with the UV coordinates and index of its material."""
-
-    geometry: GltfGeometry
-    uvs: F32
-    read_material: ReadMaterial
-    material_index: int
-
-
 class _SceneBuilder:
     """Builds the scene of one file: walks the nodes, and reads meshes and materials on first use."""
 
@@ -114,11 +101,13 @@ class _SceneBuilder:
         self._light_reader = LightReader(container.document, self._collector, options.light_unit, self.warnings)
         self._geometry: dict[PrimitiveKey, GltfGeometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
-        self._nodes = place_nodes(self._document, self._scene_roots(options.scene_name), self.warnings)
-        self._skins = self._read_skins()
+        self._nodes = place_nodes(
+            self._document, scene_roots(self._document, options.scene_name, self.warnings), self.warnings
+        )
+        self._skins = read_skins(self._document, self._nodes, self._accessors, self.warnings)
         self._choices: dict[PrimitiveKey, Choices] = {}
         self._primitives: dict[tuple[int | None, Choices], list[PrimitiveKey]] = {}
-        self._bound_primitives: dict[tuple[PrimitiveKey, int], _BoundPrimitive] = {}
+        self._bound_primitives: dict[tuple[PrimitiveKey, int], BoundPrimitive] = {}
         self._mesh_names: dict[str, int] = {}
         self._flattened: list[str] = []
         self._camera_names: dict[str, int] = {}
@@ -152,49 +141,6 @@ class _SceneBuilder:
         warn_unknown_extensions(self._document, self.warnings)
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
-
-    def _scene_roots(self, scene_name: str) -> Sequence[int]:
-        """Root nodes of the scene with that name, or else of the default one; all roots if it is missing or empty."""
-        document = self._document
-        if not len(document.scenes):
-            return all_roots(document)
-        try:
-            nodes = document.scenes.get(self._scene_index(scene_name), "the file").nodes
-        except SceneError as problem:
-            self.warnings.append(unsupported(f"All nodes are shown: {problem}."))
-            return all_roots(document)
-        if not nodes and len(document.nodes):
-            self.warnings.append(unsupported("All nodes are shown: the scene of the file is empty."))
-        return nodes or all_roots(document)
-
-    def _scene_index(self, name: str) -> int:
-        """Index of the scene with that name or number, or else of the default one."""
-        scenes = self._document.root.scenes
-        names = [str(scene.get("name", "")) if isinstance(scene, dict) else "" for scene in scenes]
-        keys = {str(number): number for number in range(len(names))}
-        keys |= {key: number for number, key in reversed([*enumerate(names)]) if key}
-        index = keys.get(name, self._document.root.scene or 0)
-        if len(names) > 1 and not name:
-            others = ", ".join(quote(key or str(number)) for number, key in enumerate(names[:10]) if number != index)
-            self.warnings.append(ignored(f"The file has {len(names):,} scenes; the default is shown, not {others}."))
-        if name and name not in keys:
-            self.warnings.append(unsupported(f"The file has no scene {quote(name)}; its default scene is shown."))
-        return index
-
-    def _read_skins(self) -> dict[int, Shaped[F64, "joints 4 4"]]:
-        """Matrices of the skins that are used; a skin that cannot be read is missing, with a warning."""
-        used = sorted({placed.node.skin for placed in self._nodes if placed.node.skin is not None})
-        if not used:
-            return {}
-        everywhere = place_nodes(self._document, all_roots(self._document), [])  # joints may be in no scene
-        transforms = {placed.number: placed.to_world for placed in (*everywhere, *self._nodes)}
-        skins = {}
-        for index in used:
-            try:
-                skins[index] = joint_matrices(self._document.skins.get(index), transforms, self._accessors)
-            except SceneError as problem:
-                self.warnings.append(unsupported(f"A skin was left out: {problem}."))
-        return skins
 
     def _list_primitives(self) -> None:
         """Group the primitives of visible nodes by material and its variants."""
@@ -284,7 +230,7 @@ class _SceneBuilder:
         if min(self._remaining_triangles, self._remaining_vertices) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
         num_dimensions = count_dimensions(to_world[:3, :3])
-        mesh = _make_world_mesh(self._bind_material(key, geometry, material_index), to_world, num_dimensions, name)
+        mesh = make_world_mesh(self._bind_material(key, geometry, material_index), to_world, num_dimensions, name)
         if mesh is not None and num_dimensions == 2:
             self._flattened.append(name)
         if mesh is None:
@@ -292,13 +238,13 @@ class _SceneBuilder:
         else:
             self.meshes.append(mesh)
 
-    def _bind_material(self, key: PrimitiveKey, geometry: GltfGeometry, material_index: int) -> _BoundPrimitive:
+    def _bind_material(self, key: PrimitiveKey, geometry: GltfGeometry, material_index: int) -> BoundPrimitive:
         """A primitive with its material, cached for all nodes that show it."""
         if (key, material_index) not in self._bound_primitives:
             read_material = self.materials[material_index]
             self._warn_missing_uvs(key, geometry, read_material)
             uvs = read_material.uv_slot.apply(geometry.uvs, len(geometry.positions))
-            self._bound_primitives[key, material_index] = _BoundPrimitive(geometry, uvs, read_material, material_index)
+            self._bound_primitives[key, material_index] = BoundPrimitive(geometry, uvs, read_material, material_index)
         return self._bound_primitives[key, material_index]
 
     def _warn_missing_uvs(self, key: PrimitiveKey, geometry: GltfGeometry, read_material: ReadMaterial) -> None:
@@ -437,46 +383,3 @@ def _list_faults(warnings: Sequence[ImporterWarning]) -> str:
             listed.append(fault[:_MAX_FAULTS])
     more = f"; and {len(faults) - len(listed):,} more" if len(faults) > len(listed) else ""
     return f" ({'; '.join(listed)}{more})" if listed else ""
-
-
-def _make_world_mesh(bound: _BoundPrimitive, to_world: F64, num_dimensions: int, name: str) -> Mesh | None:
-    """Transform geometry to world space; None if the result is degenerate. Mirroring flips the faces."""
-    geometry, uvs, read_material, material_index = bound
-    linear = to_world[:3, :3]
-    positions = geometry.positions @ linear.T + to_world[:3, 3]
-    if num_dimensions < 2 or np.abs(positions).max() > MAX_COORDINATE:
-        return None
-    orientation = np.sign(determinant(linear)) if num_dimensions == 3 else 1.0
-    faces = geometry.faces if orientation > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
-    normals = _normalize(geometry.normals @ (orientation * cofactors(linear)).T)
-    if num_dimensions == 2:
-        faces = remove_degenerate(positions, faces)
-        normals = np.where(normals.any(axis=1, keepdims=True), normals, plane_normal(linear))
-        if not len(faces):
-            return None
-    tangents = np.zeros((len(positions), 4))
-    tangents[:, :3] = _normalize(geometry.tangents[:, :3] @ linear.T)
-    tangents[:, 3] = geometry.tangents[:, 3] * orientation
-    mesh = Mesh(
-        name,
-        positions.astype(np.float32),
-        normals.astype(np.float32),
-        tangents.astype(np.float32),
-        uvs,
-        faces,
-        material_index,
-    )
-    if read_material.material.normal_map is None and read_material.tangent_rotation is None:
-        return mesh
-    is_missing = ~mesh.tangents[:, :3].any(axis=1, keepdims=True)
-    if is_missing.any():
-        computed = compute_tangents(mesh.positions, mesh.normals, mesh.uvs, faces)
-        mesh = replace(mesh, tangents=np.where(is_missing, computed, mesh.tangents))
-    if not read_material.tangent_rotation:
-        return mesh
-    return replace(mesh, tangents=rotate_tangents(mesh.tangents, mesh.normals, read_material.tangent_rotation))
-
-
-def _normalize(vectors: F64) -> F64:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0, length, 1))

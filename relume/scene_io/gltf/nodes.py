@@ -13,7 +13,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.core.import_warnings import ImporterWarning, ignored, quote, unsupported
 from relume.scene_io.gltf.document import Document, Node
 
 F64 = NDArray[np.float64]
@@ -131,3 +131,37 @@ def all_roots(document: Document) -> list[int]:
         except SceneError:
             continue
     return [index for index in nodes if index not in children]
+
+
+def scene_roots(document: Document, scene_name: str, warnings: list[ImporterWarning]) -> Sequence[int]:
+    """Return the root nodes of a scene; all root nodes of the file if it is missing or empty.
+
+    Args:
+        document: document of the file. scene_name: name or number of the scene; empty for the default one.
+        warnings: gets a sentence if it is not that scene, or one of several.
+    """
+    if not len(document.scenes):
+        return all_roots(document)
+    try:
+        nodes = document.scenes.get(_scene_index(document, scene_name, warnings), "the file").nodes
+    except SceneError as problem:
+        warnings.append(unsupported(f"All nodes are shown: {problem}."))
+        return all_roots(document)
+    if not nodes and len(document.nodes):
+        warnings.append(unsupported("All nodes are shown: the scene of the file is empty."))
+    return nodes or all_roots(document)
+
+
+def _scene_index(document: Document, name: str, warnings: list[ImporterWarning]) -> int:
+    """Index of the scene with that name or number, or else of the default one."""
+    scenes = document.root.scenes
+    names = [str(scene.get("name", "")) if isinstance(scene, dict) else "" for scene in scenes]
+    keys = {str(number): number for number in range(len(names))}
+    keys |= {key: number for number, key in reversed([*enumerate(names)]) if key}
+    index = keys.get(name, document.root.scene or 0)
+    if len(names) > 1 and not name:
+        others = ", ".join(quote(key or str(number)) for number, key in enumerate(names[:10]) if number != index)
+        warnings.append(ignored(f"The file has {len(names):,} scenes; the default is shown, not {others}."))
+    if name and name not in keys:
+        warnings.append(unsupported(f"The file has no scene {quote(name)}; its default scene is shown."))
+    return index

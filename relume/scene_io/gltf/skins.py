@@ -7,7 +7,7 @@ glTF 2.0 specification, section 3.7.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,15 +15,35 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene_io.gltf.accessors import AccessorReader
-from relume.scene_io.gltf.document import Skin
+from relume.scene_io.gltf.document import Document, Skin
 from relume.scene_io.gltf.geometry import MAX_COORDINATE, GltfGeometry
+from relume.scene_io.gltf.nodes import PlacedNode, all_roots, place_nodes
 
 F64 = NDArray[np.float64]
 _BATCH = 16_384  # vertices
 
 
-def joint_matrices(
+def read_skins(
+    document: Document, nodes: Sequence[PlacedNode], accessors: AccessorReader, warnings: list[ImporterWarning]
+) -> dict[int, Shaped[F64, "joints 4 4"]]:
+    """Return the joint matrices of the skins that nodes use; one that cannot be read is missing, with a warning."""
+    used = sorted({placed.node.skin for placed in nodes if placed.node.skin is not None})
+    if not used:
+        return {}
+    everywhere = place_nodes(document, all_roots(document), [])  # joints may be in no scene
+    transforms = {placed.number: placed.to_world for placed in (*everywhere, *nodes)}
+    skins = {}
+    for index in used:
+        try:
+            skins[index] = _joint_matrices(document.skins.get(index), transforms, accessors)
+        except SceneError as problem:
+            warnings.append(unsupported(f"A skin was left out: {problem}."))
+    return skins
+
+
+def _joint_matrices(
     skin: Skin, joint_transforms: Mapping[int, Shaped[F64, "4 4"]], accessors: AccessorReader
 ) -> Shaped[F64, "joints 4 4"]:
     """Return the matrices G_j B_j of a skin.
@@ -51,7 +71,7 @@ def skin_geometry(geometry: GltfGeometry, matrices: Shaped[F64, "joints 4 4"], l
     Triangles that a matrix mirrors are flipped, so that they stay counterclockwise from outside.
 
     Args:
-        geometry: with influences of joints. matrices: from `joint_matrices`. label: names the mesh in errors.
+        geometry: with influences of joints. matrices: from `_joint_matrices`. label: names the mesh in errors.
     Raises:
         SceneError: a joint does not exist, or the result is not finite or huge.
     """
