@@ -96,6 +96,9 @@ def light_powers(lights: Sequence[Light], materials: Sequence[Material], meshes:
 
     A point light of intensity I has 4π I, a spot 2π (1 − cos θ) I within its cone, a surface of radiance L π L A. For a
     directional light of irradiance E it is the power through the scene's bounding sphere, π d² / 4 E.
+
+    Args:
+        lights: of any kind. materials, meshes: of the scene; a mesh has the index of its material.
     """
     corners = np.concatenate([[mesh.positions.min(axis=0), mesh.positions.max(axis=0)] for mesh in meshes])
     diagonal = float(np.linalg.norm(np.ptp(corners.astype(np.float64), axis=0)))

@@ -28,7 +28,12 @@ _BATCH = 16_384  # vertices
 def read_skins(
     document: Document, nodes: Sequence[PlacedNode], accessors: AccessorReader, warnings: list[ImporterWarning]
 ) -> dict[int, Shaped[F64, "joints 4 4"]]:
-    """Return the joint matrices of the skins that nodes use; one that cannot be read is missing, with a warning."""
+    """Return the matrices G_j B_j of the skins that nodes use, by index.
+
+    Args:
+        document, accessors: of the file. nodes: of the scene.
+        warnings: gets a sentence for each skin that cannot be read, which is missing in the result.
+    """
     used = sorted({placed.node.skin for placed in nodes if placed.node.skin is not None})
     if not used:
         return {}

@@ -142,7 +142,8 @@ def _repair(content: Any, fault: Any, label: str) -> list[ImporterWarning]:
         last = parents.pop() if parents else last
     if not containers or containers[-1].pop(last, None) is None:
         return []
-    return [unsupported(f"Ignored {quote(str(last))} of {label}: {_describe(fault)}.")]
+    grade = ignored if last == "name" else unsupported
+    return [grade(f"Ignored {quote(str(last))} of {label}: {_describe(fault)}.")]
 
 
 def _item(container: Any, step: str | int) -> Any:

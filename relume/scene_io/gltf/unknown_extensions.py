@@ -35,6 +35,9 @@ def warn_unknown_extensions(document: Document, warnings: list[ImporterWarning])
     """Add a sentence for each extension of the objects that were read which is not supported.
 
     Extensions of materials have their own sentences, and so have images of unreadable formats.
+
+    Args:
+        document: document of the file, after everything was read. warnings: gets the sentences.
     """
     handled = SUPPORTED_EXTENSIONS | UNREADABLE_FORMATS.keys()
     labels: dict[str, list[str]] = {name: ["the file"] for name in document.root.extensions if name not in handled}
