@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from relume.core.import_warnings import by_severity
-from relume.scene_io.import_options import Recenter, Unit, UpAxis
+from relume.scene_io.import_options import LightUnit, Recenter, Unit, UpAxis
 from relume_cli.options import Data, check_readable
 from relume_cli.terminal.printing import Json, note, print_result
 
@@ -44,25 +44,32 @@ def import_scene(
         Recenter | None,
         typer.Option(help="Make positions relative to the middle; auto does so far from zero. [default: auto]"),
     ] = None,
+    light_unit: Annotated[
+        LightUnit | None, typer.Option(help="Unit of the file's lights. [default: as the format says]")
+    ] = None,
+    scene_name: Annotated[
+        str | None, typer.Option(help="Name or number of the scene, of a glTF file with several.")
+    ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Import a scene; print its id.
 
     Prints a warning for each feature that was not read: "unsupported" is missing or differs from the file,
-    "approximated" looks much the same, "ignored" does not change the image. --up, --unit and --recenter are remembered:
-    the next import of a scene with this name has them unless others are given.
+    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter, --light-unit
+    and --scene-name are remembered: the next import of a scene with this name has them unless others are given.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.terminal.documents import scene_document
     from relume_worker.scenes import get_scene, register_scene
 
-    given = {key: value for key, value in (("up", up), ("unit", unit), ("recenter", recenter)) if value is not None}
+    options_given = {"up": up, "unit": unit, "recenter": recenter, "light_unit": light_unit, "scene_name": scene_name}
+    given = {key: value for key, value in options_given.items() if value is not None}
     if built_in is not None and given:
         from relume.core.errors import ParameterError
 
-        raise ParameterError("--built-in", built_in, "it without --up, --unit and --recenter")
+        raise ParameterError("--built-in", built_in, "it without the options of files")
     service = open_bakes(open_settings(data))
     try:
         options = None if built_in or file is None else _options(service.ledger, name or file.stem, given)
@@ -85,7 +92,7 @@ def _options(ledger: Ledger, name: str, given: Mapping[str, str]) -> ImportOptio
 
     remembered = {key: value for key, value in last_import_options(ledger, name).items() if key not in given}
     if remembered:
-        options = " ".join(f"--{key} {value}" for key, value in remembered.items())
+        options = " ".join(f"--{key.replace('_', '-')} {value}" for key, value in remembered.items())
         note(f"as in the last import of {name}: {options}")
     return ImportOptions.model_validate({**remembered, **given})
 

@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.emission import normalize_emission
 from relume.scene.model import Light, Material, Mesh
 from relume.scene.unique_names import unique_name
@@ -38,13 +37,7 @@ class LightCollector:
             name: from `name`, so that it is unique.
             fields: `kind` and all fields that differ from its defaults, without the emission.
             emission: linear RGB in the unit of the kind.
-        Raises:
-            SceneError: there are more lights than a look can have.
         """
-        if len(self.lights) == MAX_LIGHTS:
-            raise SceneError(
-                f"the scene has more than {MAX_LIGHTS} lights, with emissive materials; remove the least important ones"
-            )
         if emission.max() > MAX_EMISSION:
             self._warnings.append(
                 approximated(f"Light {quote(name)} was clamped to the maximum emission {MAX_EMISSION:g}.")
@@ -54,7 +47,7 @@ class LightCollector:
     def emissive_light(
         self, materials: Sequence[Material], emissions: Sequence[Shaped[F64, " 3"]], meshes: Sequence[Mesh]
     ) -> tuple[Material, ...]:
-        """Add a light for each material with an emission.
+        """Add a light for each material with an emission; the brightest lights remain if a look cannot have all.
 
         Emission is used as radiance without conversion: in practice, files expect 1 to look like a white surface under
         an environment of 1, not like one candela per square meter.
@@ -65,8 +58,6 @@ class LightCollector:
             meshes: all meshes of the scene; a material without a mesh is no light.
         Returns:
             The materials, with emission images divided by their mean.
-        Raises:
-            SceneError: there are more lights than a look can have.
         """
         lit_materials = []
         for number, (original, factor) in enumerate(zip(materials, emissions, strict=True)):
@@ -83,4 +74,51 @@ class LightCollector:
             else:
                 reason = "its emission texture is black there" if emitting_meshes else "no surface uses it"
                 self._warnings.append(ignored(f"Emissive material {quote(material.name)} emits no light: {reason}."))
+        self._limit(materials, meshes)
         return tuple(lit_materials)
+
+    def _limit(self, materials: Sequence[Material], meshes: Sequence[Mesh]) -> None:
+        """Omit the dimmest lights beyond the limit of a look, with a warning."""
+        num_omitted = len(self.lights) - MAX_LIGHTS
+        if num_omitted <= 0:
+            return
+        powers = light_powers(self.lights, materials, meshes)
+        ranking = sorted(range(len(powers)), key=lambda number: -powers[number])
+        omitted = set(ranking[MAX_LIGHTS:])
+        example = quote(self.lights[ranking[MAX_LIGHTS]].name)
+        message = f"{num_omitted:,} of {len(self.lights):,} lights, the dimmest, were left out, for example {example};"
+        self._warnings.append(unsupported(f"{message} at most {MAX_LIGHTS} are possible, with emissive materials."))
+        self.lights = [light for number, light in enumerate(self.lights) if number not in omitted]
+
+
+def light_powers(lights: Sequence[Light], materials: Sequence[Material], meshes: Sequence[Mesh]) -> list[float]:
+    """Power of each light, W, averaged over red, green and blue.
+
+    A point light of intensity I has 4π I, a spot 2π (1 − cos θ) I within its cone, a surface of radiance L π L A. For a
+    directional light of irradiance E it is the power through the scene's bounding sphere, π d² / 4 E.
+
+    Args:
+        lights: of any kind. materials, meshes: of the scene; a mesh has the index of its material.
+    """
+    corners = np.concatenate([[mesh.positions.min(axis=0), mesh.positions.max(axis=0)] for mesh in meshes])
+    diagonal = float(np.linalg.norm(np.ptp(corners.astype(np.float64), axis=0)))
+    areas: dict[str, float] = {}
+    for mesh in meshes:
+        name = materials[mesh.material].name
+        areas[name] = areas.get(name, 0.0) + mesh_area(mesh)
+
+    def extent(fields: Mapping[str, Any]) -> float:
+        if fields["kind"] == "mesh":
+            return np.pi * areas.get(fields["material"], 0.0)
+        if fields["kind"] == "directional":
+            return np.pi * diagonal**2 / 4
+        half_angle = np.radians(fields["cone"][1]) if fields["kind"] == "spot" else np.pi
+        return float(2 * np.pi * (1 - np.cos(half_angle)))
+
+    return [extent(light.fields) * float(np.mean(light.fields["emission"])) for light in lights]
+
+
+def mesh_area(mesh: Mesh) -> float:
+    """Area of all triangles of a mesh, m²."""
+    a, b, c = (mesh.positions[mesh.faces[:, k]].astype(np.float64) for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 UpAxis = Literal["file", "y", "z", "-z"]
 Unit = Literal["file", "m", "cm", "mm", "in", "ft", "auto"]
 Recenter = Literal["auto", "always", "never"]
+LightUnit = Literal["file", "W/sr", "W"]
 
 
 class ImportOptions(BaseModel):
@@ -19,6 +20,9 @@ class ImportOptions(BaseModel):
         unit: the file's unit. "file": as the file says, meters if it does not. "auto": a guess from the size.
         recenter: whether positions are relative to the middle of the scene. "auto": if it is more than a hundred times
             its size from the origin, where single precision would round the shape.
+        light_unit: unit of the file's punctual lights. "file": as the format says, candela and lux in glTF. "W/sr":
+            radiometric, W/sr and W/m², as Blender exports "Unitless". "W": power of point and spot lights, as "Raw".
+        scene_name: name or number of the scene to read, of a glTF file with several; empty for the file's default.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -26,6 +30,8 @@ class ImportOptions(BaseModel):
     up: UpAxis = "file"
     unit: Unit = "file"
     recenter: Recenter = "auto"
+    light_unit: LightUnit = "file"
+    scene_name: Annotated[str, Field(max_length=200)] = ""
 
     def document(self) -> dict[str, str]:
         """The options as JSON, without those that have their default."""

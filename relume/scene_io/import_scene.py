@@ -10,7 +10,7 @@ from relume.assets.environments.environment import Environment
 from relume.core.errors import SceneError
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
-from relume.scene_io.import_options import ImportOptions, Recenter
+from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply import import_obj, import_ply, import_stl, is_stl
 from relume.scene_io.placement import place
 from relume.scene_io.referenced_files import Companions, Folder, NoFiles
@@ -47,15 +47,18 @@ def import_scene(
     if data.startswith(b"PK"):
         data, companions = open_zip(data)
     options = options or ImportOptions()
-    return place(_read(data, name, environment, companions, options.recenter), options)
+    return place(_read(data, name, environment, companions, options), options)
 
 
-def _read(data: bytes, name: str, environment: Environment | None, companions: Companions, recenter: Recenter) -> Scene:
+def _read(
+    data: bytes, name: str, environment: Environment | None, companions: Companions, options: ImportOptions
+) -> Scene:
     """The scene in the axes and unit of the file."""
+    recenter = options.recenter
     if data.removeprefix(codecs.BOM_UTF8).startswith(b"ply"):
         return import_ply(data, name, environment, companions, recenter)
     if data.startswith(b"glTF") or data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
-        return import_gltf(data, name, environment, companions)
+        return import_gltf(data, name, environment, companions, options)
     if b"\0" not in data[:4_096] and OBJ_LINE.search(data[: 1 << 20]):
         return import_obj(data, name, environment, companions, recenter)
     if is_stl(data):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, by_severity, ignored
+from relume.scene.collect_lights import mesh_area
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 from relume.scene_io.gltf.cameras import framing_camera
@@ -79,12 +80,7 @@ def bounds(scene: Scene) -> tuple[Shaped[F64, " 3"], Shaped[F64, " 3"]]:
 
 def area(scene: Scene) -> float:
     """Area of all triangles of a scene, m²."""
-    return sum(_mesh_area(mesh) for mesh in scene.meshes)
-
-
-def _mesh_area(mesh: Mesh) -> float:
-    a, b, c = (mesh.positions[mesh.faces[:, k]].astype(np.float64) for k in range(3))
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    return sum(mesh_area(mesh) for mesh in scene.meshes)
 
 
 def _guess_unit(sides: F64, warnings: list[ImporterWarning]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import posixpath
+import re
 import unicodedata
 import zipfile
 from collections.abc import Callable, Mapping
@@ -11,7 +12,10 @@ from typing import Generic, Protocol, TypeVar
 from urllib.parse import unquote
 
 from relume.core.errors import SceneError
+from relume.core.import_warnings import UNREADABLE
 
+ABSOLUTE = re.compile(r"[A-Za-z]:|[A-Za-z][\w+.-]*:/|:")
+"""Start of a path with a drive letter, or of a URL; a colon elsewhere is part of a name."""
 MAX_BYTES = 512 << 20  # of all companions of a scene
 Entry = TypeVar("Entry")
 
@@ -34,7 +38,8 @@ def relative_path(name: str, label: str) -> str:
         SceneError: it is absolute, a URL, or leaves its folder.
     """
     plain = posixpath.normpath(name.replace("\\", "/"))
-    if plain.startswith(("/", "../")) or plain in ("..", ".") or ":" in plain or not plain.isprintable():
+    is_absolute = plain.startswith(("/", "../")) or ABSOLUTE.match(plain) is not None
+    if is_absolute or plain in ("..", ".") or UNREADABLE.search(plain):
         printable = name[:60].encode("ascii", "replace").decode()
         raise SceneError(f"{label} is outside the scene's folder ({printable!r}); put it next to the scene file")
     return plain

@@ -58,7 +58,9 @@ def test_import_refuses_json_that_is_no_gltf(text: bytes) -> None:
 
 
 def test_import_explains_how_to_unpack() -> None:
-    assert "@gltf-transform/cli ktxdecompress" in rejected(changed(extensionsRequired=["KHR_texture_basisu"]))
+    glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
+    glb.document |= {"textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]}
+    assert any("@gltf-transform/cli ktxdecompress" in warning for warning in imported(glb.bytes()).warnings)
 
 
 def test_import_shows_names_without_control_characters() -> None:
@@ -68,8 +70,8 @@ def test_import_shows_names_without_control_characters() -> None:
     warnings = imported(glb.bytes()).warnings
     assert len(warnings) == 5
     assert all(warning.isprintable() for warning in warnings)
-    glb.document["meshes"][0]["primitives"][0]["attributes"]["X\nY"] = -1
-    rejected(glb.bytes())
+    glb.document["meshes"][0]["primitives"][0]["attributes"]["X\nY"] = "no index"
+    assert all(warning.isprintable() for warning in imported(glb.bytes()).warnings)
 
 
 def test_import_keeps_control_characters_out_of_names() -> None:

@@ -14,6 +14,7 @@ from relume.core.errors import SceneError
 from relume.look import default_look
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
+from relume.scene_io.import_options import ImportOptions
 
 LIGHT = Environment("gray", np.ones((4, 8, 3), np.float32))
 
@@ -98,11 +99,28 @@ def test_equal_light_names_are_made_unique_and_ranges_give_a_warning() -> None:
     assert len([warning for warning in scene.warnings if "range" in warning]) == 2
 
 
-def test_sixty_four_lights_are_read_and_thousands_are_rejected() -> None:
+def test_the_brightest_lights_remain_where_there_are_too_many() -> None:
     assert len(imported(with_lights([{"type": "point"}] * 64)).lights) == 64
-    for num in (65, 3000):
-        with pytest.raises(SceneError, match="more than 64 lights"):
-            imported(with_lights([{"type": "point"}] * num))
+    lights = [{"type": "point", "name": f"L{k}", "intensity": 1000 + k} for k in range(70)]
+    scene = imported(with_lights(lights))
+    assert [light.name for light in scene.lights] == [f"L{k}" for k in range(6, 70)]
+    (warning,) = (warning for warning in scene.warnings if "dimmest" in warning)
+    assert "6 of 70" in warning
+    assert warning.severity == "unsupported"
+
+
+def test_lights_of_all_kinds_compare_by_their_power() -> None:
+    """A quad that emits L has π L; a directional light of irradiance E passes π d² / 4 E."""
+    glb = with_lights([{"type": "point", "name": f"L{k}", "intensity": 683} for k in range(64)])
+    glb.document["extensions"]["KHR_lights_punctual"]["lights"] += [
+        {"type": "directional", "name": "Sun", "intensity": 683 * 10},
+        {"type": "spot", "name": "Spot", "intensity": 683 * 2, "spot": {"outerConeAngle": np.pi / 3}},
+    ]
+    glb.document["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": k}}} for k in (64, 65)]
+    glb.document["scenes"][0]["nodes"] += [65, 66]
+    names = [light.name for light in imported(glb).lights]
+    assert "Sun" in names  # π/4 · 2 · 10 = 15.7 W, a point light has 12.6 W
+    assert "Spot" not in names  # π · 2 = 6.3 W
 
 
 def test_too_bright_lights_are_clamped_and_zero_scaled_ones_omitted() -> None:
@@ -117,17 +135,61 @@ def test_too_bright_lights_are_clamped_and_zero_scaled_ones_omitted() -> None:
     ("lights", "node"),
     [
         ([{"type": "laser"}], {"light": 0}),
-        ([{"type": "point", "intensity": -1}], {"light": 0}),
-        ([{"type": "point", "color": [1, 1]}], {"light": 0}),
-        ([{"type": "spot", "spot": {"outerConeAngle": 0}}], {"light": 0}),
         ([{"type": "point"}], {"light": 1}),
         ([{"type": "point"}], {"light": -1}),
         ([{"type": "point"}], "lamp"),
         ({"a": 1}, {"light": 0}),
-        ([{"type": "point"}] * 10_001, {"light": 0}),
     ],
 )
-def test_invalid_gltf_lights_are_rejected(lights: Any, node: Any) -> None:
-    glb = with_lights(lights, [{"extensions": {"KHR_lights_punctual": node}}])
-    with pytest.raises(SceneError, match="export it again"):
-        imported(glb)
+def test_lights_that_cannot_be_read_are_left_out_with_a_warning(lights: Any, node: Any) -> None:
+    scene = imported(with_lights(lights, [{"extensions": {"KHR_lights_punctual": node}}]))
+    assert len(scene.meshes) == 1
+    assert not scene.lights
+    assert [warning for warning in scene.warnings if "left out" in warning and warning.severity == "unsupported"]
+
+
+def test_other_lights_of_a_file_remain() -> None:
+    scene = imported(with_lights([{"type": "ambient"}, {"type": "point", "name": "Bulb"}]))
+    assert [light.name for light in scene.lights] == ["Bulb"]
+    assert any("light 0" in warning and "“ambient”" in warning for warning in scene.warnings)
+
+
+@pytest.mark.parametrize(
+    ("light", "name", "value"),
+    [
+        ({"type": "point", "color": [1.2, 0.5, 0], "intensity": 683}, "emission", [1, 0.5, 0]),
+        ({"type": "point", "color": [1, 1], "intensity": 683}, "emission", [1, 1, 1]),
+        ({"type": "spot", "spot": {"outerConeAngle": 1.6, "innerConeAngle": 0.5}}, "cone", [np.degrees(0.5), 90]),
+        ({"type": "spot", "spot": {"outerConeAngle": 0}}, "cone", [0, 45]),
+    ],
+)
+def test_numbers_of_lights_out_of_range_are_clamped_or_default(light: dict[str, Any], name: str, value: Any) -> None:
+    scene = imported(with_lights([light]))
+    np.testing.assert_allclose(scene.lights[0].fields[name], value)
+    assert len([warning for warning in scene.warnings if "light 0" in warning]) == 1
+
+
+@pytest.mark.parametrize(
+    ("unit", "point", "sun"), [("file", 100 / 683, 10 / 683), ("W/sr", 100, 10), ("W", 25 / np.pi, 10)]
+)
+def test_lights_have_the_unit_that_is_given(unit: Any, point: float, sun: float) -> None:
+    """100 W of a point light are 7.96 W/sr."""
+    glb = with_lights([{"type": "point", "intensity": 100}, {"type": "directional", "intensity": 10}])
+    scene = import_gltf(glb.bytes(), "lights", LIGHT, options=ImportOptions(light_unit=unit))
+    np.testing.assert_allclose([light.fields["emission"][0] for light in scene.lights], [point, sun], rtol=1e-6)
+    assert len(scene.warnings) == (unit == "file")
+
+
+@pytest.mark.parametrize(("intensity", "num_warnings"), [(7.96, 1), (5435.0, 0)])
+def test_lights_that_are_dim_for_candela_give_a_warning(intensity: float, num_warnings: int) -> None:
+    """A point light of 100 W, as Blender exports it without and with units."""
+    glb = with_lights([{"type": "point", "intensity": intensity}])
+    glb.document["asset"]["generator"] = "Blender I/O"
+    warnings = [warning for warning in imported(glb).warnings if "light unit" in warning]
+    assert len(warnings) == num_warnings
+    assert all("“Blender I/O”" in warning and "7.96 candela" in warning for warning in warnings)
+
+
+def test_too_many_definitions_are_rejected() -> None:
+    with pytest.raises(SceneError, match="more than 10,000 lights"):
+        imported(with_lights([{"type": "point"}] * 10_001, []))

@@ -10,7 +10,6 @@ from glb_builder import DIELECTRIC_TRANSMISSION, Glb
 from texture_values import get_texture_values
 
 from relume.assets.environments.environment import Environment
-from relume.core.errors import SceneError
 from relume.scene.model import Scene
 from relume.scene.scene_folder import load_scene, save_scene
 from relume.scene_io.gltf import import_gltf
@@ -116,9 +115,10 @@ def test_variants_are_stored_with_the_scene(tmp_path) -> None:
         [{"material": 1, "variants": [0]}] * 101,
     ],
 )
-def test_invalid_mappings_are_rejected(mappings: Any) -> None:
-    with pytest.raises(SceneError):
-        imported(with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
+def test_invalid_mappings_are_left_out_with_a_warning(mappings: Any) -> None:
+    scene = imported(with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
+    assert scene.materials[0].name == "Red"
+    assert scene.warnings
 
 
 def test_a_mapping_to_a_missing_variant_changes_nothing() -> None:
@@ -127,11 +127,12 @@ def test_a_mapping_to_a_missing_variant_changes_nothing() -> None:
     assert all(look == {"materials": {}} for look in scene.variants.values())
 
 
-def test_too_many_variants_are_rejected() -> None:
+def test_too_many_variants_are_left_out_with_a_warning() -> None:
     glb = with_variants(Glb(), [plain("Red", 1, 0, 0)], [[]])
     glb.document["extensions"]["KHR_materials_variants"]["variants"] = [{}] * 101
-    with pytest.raises(SceneError, match="variants"):
-        imported(glb)
+    scene = imported(glb)
+    assert not scene.variants
+    assert any("variants" in warning for warning in scene.warnings)
 
 
 def test_a_variant_follows_the_same_roughness_map_or_has_its_mean() -> None:

@@ -157,11 +157,14 @@ def test_an_emissive_material_without_surface_is_no_light(tmp_path: Path) -> Non
     assert any("“bulb” emits no light: no surface" in warning for warning in scene.warnings)
 
 
-def test_more_than_sixty_four_emissive_materials_are_rejected(tmp_path: Path) -> None:
-    library = "".join(f"newmtl m{k}\nKe 1\n" for k in range(65))
+def test_the_brightest_sixty_four_emissive_materials_are_lights(tmp_path: Path) -> None:
+    library = "".join(f"newmtl m{k}\nKe {k + 1}\n" for k in range(65))
     faces = "".join(f"usemtl m{k}\nf 1 2 3\n" for k in range(65))
-    with pytest.raises(SceneError, match="more than 64 lights"):
-        emissions_of(tmp_path, library, faces)
+    (tmp_path / "a.mtl").write_text(library)
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{SQUARE}{faces}")
+    scene = import_scene(tmp_path / "a.obj", "lights", LIGHT)
+    assert [light.name for light in scene.lights] == [f"m{k}" for k in range(1, 65)]
+    assert any("1 of 65 lights" in warning and "“m0”" in warning for warning in scene.warnings)
 
 
 def test_missing_files_give_a_warning(tmp_path: Path) -> None:

@@ -60,8 +60,14 @@ def test_scene_formats_are_detected_by_content_and_may_have_more_files(client: T
 def test_import_options_are_applied_and_returned(client: TestClient) -> None:
     obj = b"v 0 0 0\nv 100 0 0\nv 0 0 200\nf 1 2 3\n"
     plain = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}).json()
-    assert plain["import_options"] == {"up": "file", "unit": "file", "recenter": "auto"}
-    options = {"up": "z", "unit": "cm", "recenter": "always"}
+    assert plain["import_options"] == {
+        "up": "file",
+        "unit": "file",
+        "recenter": "auto",
+        "light_unit": "file",
+        "scene_name": "",
+    }
+    options = {"up": "z", "unit": "cm", "recenter": "always", "light_unit": "W/sr", "scene_name": "B"}
     created = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}, data=options)
     assert created.status_code == 201, created.text
     scene = client.get(f"/api/scenes/{created.json()['id']}").json()

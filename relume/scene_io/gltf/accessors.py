@@ -20,11 +20,11 @@ from relume.scene_io.gltf.compression import (
     read_draco,
     read_meshopt,
 )
-from relume.scene_io.gltf.container import UNSUPPORTED_COMPRESSION, GltfContainer
+from relume.scene_io.gltf.container import GltfContainer
 from relume.scene_io.gltf.document import Accessor, BufferView, Primitive, Sparse
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MAX_NUMBERS = 240_000_000  # in all accessors that are read; about the content of the largest allowed file
 
 Array = NDArray[Any]
@@ -96,8 +96,7 @@ class AccessorReader:
         return self._floats[index]
 
     def _accessor(self, index: int, label: str) -> Accessor:
-        accessor: Accessor = _item_at(self._container.document.accessors, index, label)
-        return accessor
+        return self._container.document.accessors.get(index, label)
 
     def _values(self, index: int, accessor: Accessor, label: str) -> Array:
         self._budget -= accessor.count * WIDTHS[accessor.type]
@@ -126,11 +125,7 @@ def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
     Raises:
         SceneError: there is no such view, it exceeds its buffer, or its compression is unsupported.
     """
-    view = _item_at(container.document.bufferViews, index, f"the buffer view of {label}")
-    for extension in UNSUPPORTED_COMPRESSION:
-        if extension in view.extensions:
-            command = UNSUPPORTED_COMPRESSION[extension]
-            raise SceneError(f"{label} uses {extension}, which can't be read; run: {command}")
+    view = container.document.buffer_views.get(index, label)
     compression = read_meshopt(view, label)
     if compression is None:
         return _bytes(container, view, label)
@@ -146,8 +141,8 @@ def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
 
 def _bytes(container: GltfContainer, view: BufferView | MeshoptBuffer, label: str) -> memoryview:
     """A slice of a buffer."""
-    content: memoryview = _item_at(container.buffers, view.buffer, f"the buffer of {label}")
-    if view.byteOffset + view.byteLength > len(content):
+    content = container.buffer(view.buffer, label)
+    if view.byteOffset < 0 or view.byteOffset + view.byteLength > len(content):
         raise SceneError(f"the buffer view of {label} exceeds its buffer; export the scene again")
     return content[view.byteOffset : view.byteOffset + view.byteLength]
 
@@ -170,10 +165,12 @@ def _read_strided(
 ) -> Array:
     content = view_bytes(container, view_index, label)
     element_bytes = width * dtype.itemsize
-    stride = container.document.bufferViews[view_index].byteStride or element_bytes
+    stride = container.document.buffer_views.get(view_index, label).byteStride or element_bytes
     if stride < element_bytes:
         raise SceneError(f"{label} have a stride of {stride} for elements of {element_bytes} bytes; export it again")
-    if offset + (count - 1) * stride + element_bytes > len(content):
+    if count == 0:
+        return np.zeros((0, width), dtype)
+    if offset < 0 or offset + (count - 1) * stride + element_bytes > len(content):
         raise SceneError(f"{label} have more elements than their buffer view; export the scene again")
     return np.ndarray((count, width), dtype, content, offset, (stride, dtype.itemsize)).copy()
 
@@ -187,7 +184,7 @@ def _substitute(container: GltfContainer, sparse: Sparse, values: Array, label: 
     indices = _read_strided(
         container, index_view.bufferView, index_view.byteOffset, sparse.count, 1, index_dtype, f"sparse {label}"
     )
-    if int(indices.max()) >= num_elements:
+    if sparse.count and int(indices.max()) >= num_elements:
         raise SceneError(f"{label} have sparse indices out of range; export the scene again")
     value_view = sparse.values
     values[indices[:, 0]] = _read_strided(
@@ -197,14 +194,8 @@ def _substitute(container: GltfContainer, sparse: Sparse, values: Array, label: 
 
 def _check_zeros(container: GltfContainer, accessor: Accessor, element_bytes: int, label: str) -> None:
     """Limit accessors without a view, which are zero except for their sparse part and could claim gigabytes."""
-    if accessor.sparse is None:
-        raise SceneError(f"{label} have no data; export the scene again")
-    buffer_bytes = sum(len(buffer) for buffer in container.buffers)
+    if accessor.sparse is not None:
+        view_bytes(container, accessor.sparse.values.bufferView, label)  # reads its buffer
+    buffer_bytes = sum(len(buffer) for buffer in container.buffers.values())
     if accessor.count * element_bytes > 1000 * buffer_bytes:
         raise SceneError(f"{label} claim {accessor.count:,} elements but contain almost none; export the scene again")
-
-
-def _item_at(items: Any, index: int, label: str) -> Any:
-    if index >= len(items):
-        raise SceneError(f"{label} refer to number {index} of {len(items)}; export the scene again")
-    return items[index]

@@ -1,8 +1,9 @@
 """The base layer of a material with textures: diffuse albedo and f0 of every texel, in batches of rows.
 
-    diffuse = b (1 - m),  f0 = mix(s min(c f, 1), b, m),  f90 = mix(s, 1, m)
+    diffuse = b (1 - m) (1 - R),  f0 = mix(s min(c f, 1), b, m),  f90 = mix(s, 1, m)
 
-for base color b, metallic m, specular s with color c and reflectance f, see `relume.scene_io.gltf.materials`.
+for base color b, metallic m, specular s with color c and reflectance f, see `relume.scene_io.gltf.materials`. The mean
+reflectance R of the dielectric scales the texture if it varies, else the term.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from jaxtyping import Shaped
 from relume.scene.model import Texture, TextureEncoding
 from relume.scene.texture_encoding import F32, F64, ROWS_PER_BATCH, SRGB_TO_LINEAR, U8, encode_rows
 from relume.scene_io.gltf.texture_resampling import Raster
+from relume.scene_io.gltf.to_terms import dielectric_reflectance
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,31 @@ class MetallicBlend:
         """Image that is multiplied by the metallic factor."""
         return self.raster.channel("packed", 2) if self.metallic else np.zeros((1, 1, 1), np.uint8)
 
+    @property
+    def reflectance_varies(self) -> bool:
+        """True if the reflectance of the dielectric has a texture that varies."""
+        return any(
+            self.raster.varies(key, k) for key, channels in (("specular", (3,)), ("tint", (0, 1, 2))) for k in channels
+        )
+
+    def mean_reflectance(self) -> float:
+        """Mean specular reflectance of the dielectric, of uniform textures or none."""
+        tint = SRGB_TO_LINEAR[
+            np.rint([255 * self.raster.mean("tint", channel) for channel in range(3)]).astype(np.uint8)
+        ]
+        weight = self.specular * self.raster.mean("specular", 3)
+        return dielectric_reflectance(float(np.minimum(tint * self.dielectric, 1).max()) * weight, weight)
+
+    def _transmittance(self, rows: slice) -> F32:
+        """1 − R of texels. (rows, width or 1, 1)"""
+        weight = np.float32(self.specular) * _unit_values(self.raster.channel("specular", 3), rows)
+        f0 = self._dielectric_f0(rows).max(axis=-1, keepdims=True)
+        return np.asarray(1 - dielectric_reflectance(f0, weight), np.float32)
+
     def diffuse(self) -> Texture:
         """Texture that multiplies the diffuse color."""
         base, metallic = self.raster.rgb("base"), self._metallic_image
-        if metallic.size == 1 and base.shape[:2] == self.raster.size:
+        if metallic.size == 1 and base.shape[:2] == self.raster.size and not self.reflectance_varies:
             diffuse_scale = 1 - self.metallic * float(metallic[0, 0, 0]) / 255
             return Texture(
                 np.ascontiguousarray(base),
@@ -50,17 +73,21 @@ class MetallicBlend:
             )
 
         def values(rows: slice) -> F32:
-            return SRGB_TO_LINEAR[select_rows(base, rows)] * (
+            diffuse = SRGB_TO_LINEAR[select_rows(base, rows)] * (
                 1 - np.float32(self.metallic) * _unit_values(metallic, rows)
             )
+            return np.asarray(diffuse * self._transmittance(rows) if self.reflectance_varies else diffuse, np.float32)
 
         return encode_rows(values, self.raster.size, np.ones(3), self.raster.wrap)
 
-    def _f0(self, rows: slice) -> F32:
-        metallic = np.float32(self.metallic) * _unit_values(self._metallic_image, rows)
+    def _dielectric_f0(self, rows: slice) -> F32:
         weight = np.float32(self.specular) * _unit_values(self.raster.channel("specular", 3), rows)
         tint = SRGB_TO_LINEAR[select_rows(self.raster.rgb("tint"), rows)]
-        head_on = np.minimum(tint * self.dielectric.astype(np.float32), 1) * weight
+        return np.asarray(np.minimum(tint * self.dielectric.astype(np.float32), 1) * weight, np.float32)
+
+    def _f0(self, rows: slice) -> F32:
+        metallic = np.float32(self.metallic) * _unit_values(self._metallic_image, rows)
+        head_on = self._dielectric_f0(rows)
         base = (
             SRGB_TO_LINEAR[select_rows(self.raster.rgb("base"), rows)]
             if metallic.any()

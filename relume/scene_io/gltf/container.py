@@ -13,58 +13,74 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import unquote_to_bytes
 
-from pydantic import ValidationError
-
 from relume.core.errors import SceneError
-from relume.core.import_warnings import UNREADABLE
-from relume.scene_io.gltf.compression import DRACO, MESHOPT, is_fallback
-from relume.scene_io.gltf.document import Buffer, Document
-from relume.scene_io.gltf.material_extensions import MATERIAL_EXTENSIONS
+from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.scene_io.gltf.compression import is_fallback
+from relume.scene_io.gltf.document import LIMITS, Document, Root
+from relume.scene_io.gltf.tolerant import read_object
 from relume.scene_io.referenced_files import Companions
 
 MAX_JSON_VALUES = 4_000_000
 PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
-# Unsupported required extensions that compress accessors or images, with the command that decompresses them.
-UNSUPPORTED_COMPRESSION = {
-    "KHR_texture_basisu": "npx @gltf-transform/cli ktxdecompress in.glb out.glb",
-}
-SUPPORTED_EXTENSIONS = {
-    DRACO,
-    *MESHOPT,
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-    "EXT_mesh_gpu_instancing",
-    "EXT_texture_webp",
-    "KHR_lights_punctual",
-    "KHR_materials_variants",
-    *MATERIAL_EXTENSIONS,
-}
-
 
 @dataclass(frozen=True)
 class GltfContainer:
-    """A document and the bytes of its buffers, each at least as long as declared.
+    """A document and the bytes that it refers to, which are read when they are used.
 
     Attributes:
-        decompressed_views: cache of decompressed buffer views, by index.
+        binary: the binary chunk of a .glb file. companions: files that it may refer to.
+        warnings: gets a sentence for each fault.
+        buffers: cache of buffers, by index. decompressed_views: cache of decompressed buffer views, by index.
     """
 
     document: Document
-    buffers: tuple[memoryview, ...]
+    binary: memoryview | None
     companions: Companions
+    warnings: list[ImporterWarning]
+    buffers: dict[int, memoryview] = field(default_factory=dict)
     decompressed_views: dict[int, memoryview] = field(default_factory=dict)
 
     def resolve(self, uri: str, label: str) -> bytes:
         """Return the content of a data URI or of a companion file. Raises SceneError."""
         return _resolve(uri, self.companions, label)
 
+    def buffer(self, index: int, label: str) -> memoryview:
+        """Return the bytes of a buffer, at most as long as declared.
 
-def read_container(data: bytes, companions: Companions) -> GltfContainer:
-    """Split a file into its document and its buffers, and validate both.
+        Args:
+            index: index in the document. label: names the object that refers to it, in errors.
+        Raises:
+            SceneError: it does not exist, or its file is missing or unreadable.
+        """
+        if index not in self.buffers:
+            self.buffers[index] = self._read_buffer(index, label)
+        return self.buffers[index]
 
+    def _read_buffer(self, index: int, label: str) -> memoryview:
+        buffer = self.document.buffers.get(index, label)
+        if is_fallback(buffer.extensions):
+            return memoryview(b"")
+        if buffer.uri is not None:
+            content = memoryview(self.resolve(buffer.uri, f"buffer {index}"))
+        elif index == 0 and self.binary is not None:
+            content = self.binary
+        else:
+            raise SceneError(f"buffer {index} has no data; {PACK}")
+        if len(content) < buffer.byteLength:
+            message = f"Buffer {index} is truncated: {len(content):,} of {buffer.byteLength:,} bytes."
+            self.warnings.append(unsupported(message))
+        return content[: buffer.byteLength]
+
+
+def read_container(data: bytes, companions: Companions, warnings: list[ImporterWarning]) -> GltfContainer:
+    """Split a file into its document and its binary chunk, and validate the outermost object.
+
+    Args:
+        data: the file's bytes. companions: files that it may refer to.
+        warnings: gets a sentence for each fault of the document that does not prevent its use.
     Raises:
-        SceneError: truncated, not glTF 2, refers to missing files, or requires an unsupported compression.
+        SceneError: truncated, not glTF 2, or has too many objects.
     """
     if data[:4] == b"glTF":
         json_bytes, binary = _split_glb(data)
@@ -72,35 +88,25 @@ def read_container(data: bytes, companions: Companions) -> GltfContainer:
         json_bytes, binary = data, None
     else:
         raise SceneError("the scene file is neither .glb nor .gltf; export it as binary glTF 2.0 (.glb)")
-    document = parse_document(json_bytes)
-    _check_extensions(document)
-    buffers = [_buffer(i, buffer, binary, companions) for i, buffer in enumerate(document.buffers)]
-    return GltfContainer(document, tuple(buffers), companions)
+    return GltfContainer(parse_document(json_bytes, warnings), binary, companions, warnings)
 
 
-def parse_document(json_bytes: bytes) -> Document:
-    """Parse and validate the JSON chunk. The SceneError names the first invalid value."""
+def parse_document(json_bytes: bytes, warnings: list[ImporterWarning]) -> Document:
+    """Parse the JSON chunk, where null means that a property is missing. Raises SceneError as `read_container`."""
     if sum(json_bytes.count(mark) for mark in b",[{") > MAX_JSON_VALUES:  # each value follows one of these
         raise SceneError(f"the scene's JSON has more than {MAX_JSON_VALUES:,} values; export it as .glb")
+    text = json_bytes.rstrip(b" \t\r\n\0")  # some exporters pad the chunk with zeros
     try:
-        content = json.loads(json_bytes.decode("utf-8-sig"), parse_constant=_refuse_constant)
+        content = json.loads(
+            text.decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_without_nulls
+        )
     except (ValueError, RecursionError) as problem:
         raise SceneError(f"the scene's JSON cannot be read ({_first_line(problem)}); export it again") from None
-    try:
-        return Document.model_validate(content)
-    except ValidationError as problem:
-        first_error = problem.errors(include_url=False, include_input=False)[0]
-        location = UNREADABLE.sub("", "/".join(str(step)[:40] for step in first_error["loc"])) or "the document"
-        if first_error["type"] == "too_long":
-            max_length = first_error["ctx"]["max_length"]
-            raise SceneError(
-                f"the scene has more than {max_length:,} {location}, the limit; merge some or split the scene"
-            ) from None
-        raise SceneError(
-            f"the scene's JSON is not valid glTF 2.0 at {location}: {first_error['msg']}; export it again"
-        ) from None
-    except RecursionError:
-        raise SceneError("the scene's JSON is nested too deeply; export it again") from None
+    root = read_object(Root, content, "the scene's JSON", warnings)
+    for name, limit in LIMITS.items():
+        if len(getattr(root, name)) > limit:
+            raise SceneError(f"the scene has more than {limit:,} {name}, the limit; merge some or split the scene")
+    return Document(root, warnings)
 
 
 def _resolve(uri: str, companions: Companions, label: str) -> bytes:
@@ -147,25 +153,8 @@ def _split_glb(data: bytes) -> tuple[bytes, memoryview | None]:
     return bytes(chunks[0][1]), binary
 
 
-def _buffer(i: int, buffer: Buffer, binary: memoryview | None, companions: Companions) -> memoryview:
-    if is_fallback(buffer.extensions):
-        return memoryview(b"")
-    if buffer.uri is not None:
-        content = memoryview(_resolve(buffer.uri, companions, f"buffer {i}"))
-    elif i == 0 and binary is not None:
-        content = binary
-    else:
-        raise SceneError(f"buffer {i} has no data; {PACK}")
-    if len(content) < buffer.byteLength:
-        raise SceneError(f"buffer {i} is truncated: {len(content):,} of {buffer.byteLength:,} bytes; export it again")
-    return content[: buffer.byteLength]
-
-
-def _check_extensions(document: Document) -> None:
-    for name in document.extensionsRequired:
-        if name in UNSUPPORTED_COMPRESSION:
-            command = UNSUPPORTED_COMPRESSION[name]
-            raise SceneError(f"the file uses KTX2 textures ({name}), which can't be read; run: {command}")
+def _without_nulls(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {key: value for key, value in pairs if value is not None}
 
 
 def _refuse_constant(constant: str) -> Any:

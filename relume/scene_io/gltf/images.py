@@ -12,12 +12,15 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.image_io.decode import Decoder
 from relume.scene_io.gltf.accessors import view_bytes
 from relume.scene_io.gltf.container import GltfContainer
 
 U8 = NDArray[np.uint8]
 _CACHE_BYTES = 300_000_000  # of decoded images, which other materials may use
+UNREADABLE_FORMATS = {"KHR_texture_basisu": "KTX2", "EXT_texture_avif": "AVIF", "MSFT_texture_dds": "DDS"}
+UNPACK_KTX = " (npx @gltf-transform/cli ktxdecompress in.glb out.glb)"
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
 
@@ -30,10 +33,24 @@ class TextureSource(Protocol):
 class ImageReader:
     """Decodes the images of one file, with a cache."""
 
-    def __init__(self, container: GltfContainer) -> None:
+    def __init__(self, container: GltfContainer, warnings: list[ImporterWarning]) -> None:
         self._container = container
+        self._warnings = warnings
         self._decoded: dict[int, U8] = {}
+        self._unusable: set[int] = set()  # textures
         self._decoder = Decoder()
+
+    def is_usable(self, index: int, label: str) -> bool:
+        """True if a texture can be read; else a warning says why, once a texture."""
+        if index in self._unusable:
+            return False
+        try:
+            self.texture(index, label)
+        except SceneError as problem:
+            self._warnings.append(unsupported(f"An image was left out: {problem}."))
+            self._unusable.add(index)
+            return False
+        return True
 
     def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]:
         """Return the RGBA bytes of a texture and its wrap modes along u and v.
@@ -41,35 +58,27 @@ class ImageReader:
         Raises:
             SceneError: the texture or its file is missing, too large, damaged or in an unsupported format.
         """
-        document = self._container.document
-        if index >= len(document.textures):
-            raise SceneError(f"{label} refers to texture {index} of {len(document.textures)}; export the scene again")
-        texture = document.textures[index]
-        source = texture.source
+        texture = self._container.document.textures.get(index, label)
         webp = texture.extensions.get("EXT_texture_webp")
-        if isinstance(webp, dict) and isinstance(webp.get("source"), int):
-            source = webp["source"]
-        if source is None:
-            raise SceneError(f"{label} has an image relume cannot read; use PNG, JPEG or WebP (gltf-transform png)")
-        return self._image(source, label), self._wrap(texture.sampler, label)
+        sources = [webp.get("source") if isinstance(webp, dict) else None, texture.source]
+        usable = [source for source in sources if isinstance(source, int)]
+        if not usable:
+            formats = [name for key, name in UNREADABLE_FORMATS.items() if key in texture.extensions]
+            reason = f"is in the format {formats[0]}" if formats else "has no image"
+            raise SceneError(f"{label} {reason}; save it as PNG, JPEG or WebP{UNPACK_KTX if 'KTX2' in formats else ''}")
+        return self._image(usable[0], label), self._wrap(texture.sampler, label)
 
     def _wrap(self, index: int | None, label: str) -> tuple[str, str]:
         if index is None:
             return "repeat", "repeat"
-        samplers = self._container.document.samplers
-        if index >= len(samplers):
-            raise SceneError(f"{label} refers to sampler {index} of {len(samplers)}; export the scene again")
-        sampler = samplers[index]
+        sampler = self._container.document.samplers.get(index, label)
         return WRAPS.get(sampler.wrapS, "repeat"), WRAPS.get(sampler.wrapT, "repeat")
 
     def _image(self, index: int, label: str) -> U8:
-        images = self._container.document.images
-        if not 0 <= index < len(images):
-            raise SceneError(f"{label} refers to image {index} of {len(images)}; export the scene again")
         if index in self._decoded:
             self._decoded[index] = self._decoded.pop(index)  # most recently used last
         else:
-            image = images[index]
+            image = self._container.document.images.get(index, label)
             if image.bufferView is not None:
                 data = bytes(view_bytes(self._container, image.bufferView, label))
             elif image.uri is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,42 +16,47 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.merge_meshes import merge_by_material
-from relume.scene.model import F32, Camera, Mesh, Scene
+from relume.scene.model import Camera, Mesh, Scene
 from relume.scene.textured_vertex_colors import TexturedColors, draw_textured_colors
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.cameras import framing_camera, make_slug, rigid_frame
-from relume.scene_io.gltf.container import SUPPORTED_EXTENSIONS, GltfContainer, read_container
+from relume.scene_io.gltf.container import GltfContainer, read_container
 from relume.scene_io.gltf.degenerate_transforms import (
-    cofactors,
     count_dimensions,
-    determinant,
-    plane_normal,
-    remove_degenerate,
 )
-from relume.scene_io.gltf.document import Document, Node, Primitive
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
-from relume.scene_io.gltf.geometry import MAX_COORDINATE, GltfGeometry, count_corners, read_primitive
+from relume.scene_io.gltf.document import Node, Primitive
+from relume.scene_io.gltf.geometry import GltfGeometry, count_corners, read_primitive
 from relume.scene_io.gltf.images import ImageReader
 from relume.scene_io.gltf.instances import read_instances
 from relume.scene_io.gltf.lights import LightReader
 from relume.scene_io.gltf.materials import WHITE, MaterialReader, ReadMaterial, TextureLayout, VertexColors
-from relume.scene_io.gltf.nodes import walk_nodes
-from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
+from relume.scene_io.gltf.nodes import PlacedNode, place_nodes, scene_roots
+from relume.scene_io.gltf.skins import read_skins, skin_geometry
+from relume.scene_io.gltf.unknown_extensions import warn_unknown_extensions
+from relume.scene_io.gltf.uvs import compute_tangents
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
+from relume.scene_io.gltf.world_mesh import BoundPrimitive, make_world_mesh
+from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.referenced_files import Companions, NoFiles
 
 F64 = NDArray[np.float64]
-Key = tuple[int, int]  # index of a mesh and of one of its primitives
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
 MAX_INSTANCES = 100_000  # primitives times the nodes and instances that show them
+_MAX_FAULTS = 240  # characters of faults in an error
+_DEFAULT_MATERIAL = GltfMaterial(name="default")
 _MAX_SEPARATE_MESHES = 2_000  # beyond, meshes are merged by material: each has its own arrays in files and memory
 
 
 def import_gltf(
-    data: bytes, name: str, environment: Environment | None = None, companions: Companions | None = None
+    data: bytes,
+    name: str,
+    environment: Environment | None = None,
+    companions: Companions | None = None,
+    options: ImportOptions | None = None,
 ) -> Scene:
     """Import a .glb or .gltf file.
 
@@ -60,6 +65,7 @@ def import_gltf(
         name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: files that it may refer to; None for none.
+        options: `light_unit` and `scene_name`; None for the defaults.
 
     Returns:
         The scene, with node transforms applied: one mesh per primitive and node, cameras or one view "front", lights
@@ -68,36 +74,40 @@ def import_gltf(
     Raises:
         SceneError: the file is unusable; the message says why and what to do.
     """
-    builder = _SceneBuilder(read_container(data, companions or NoFiles()))
+    builder = _SceneBuilder(read_container(data, companions or NoFiles(), []), options or ImportOptions())
     materials = [read_material.material for read_material in builder.materials]
     contents = (name, builder.meshes, materials, builder.cameras, environment or studio())
     return finalize(*contents, builder.warnings, builder.variants, builder.lights)
 
 
-class _BoundPrimitive(NamedTuple):
-    """A primitive with the UV coordinates and index of its material."""
+class PrimitiveKey(NamedTuple):
+    """A primitive as it is shown: mesh and number in it, weights of its morph targets, and skin."""
 
-    geometry: GltfGeometry
-    uvs: F32
-    read_material: ReadMaterial
-    material_index: int
+    mesh: int
+    number: int
+    weights: tuple[float, ...]
+    skin: int | None
 
 
 class _SceneBuilder:
     """Builds the scene of one file: walks the nodes, and reads meshes and materials on first use."""
 
-    def __init__(self, container: GltfContainer) -> None:
+    def __init__(self, container: GltfContainer, options: ImportOptions) -> None:
         self._document = container.document
         self._accessors = AccessorReader(container)
-        self.warnings: list[ImporterWarning] = []
-        self._material_reader = MaterialReader(ImageReader(container), self.warnings)
+        self.warnings = container.warnings
+        self._material_reader = MaterialReader(ImageReader(container, self.warnings), self.warnings)
         self._collector = LightCollector(self.warnings)
-        self._light_reader = LightReader(container.document, self._collector, self.warnings)
-        self._geometry: dict[Key, GltfGeometry | None] = {}
+        self._light_reader = LightReader(container.document, self._collector, options.light_unit, self.warnings)
+        self._geometry: dict[PrimitiveKey, GltfGeometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
-        self._choices = _read_all_choices(container.document)
-        self._primitives = _primitives_by_material(container.document, self._choices)
-        self._bound_primitives: dict[tuple[Key, int], _BoundPrimitive] = {}
+        self._nodes = place_nodes(
+            self._document, scene_roots(self._document, options.scene_name, self.warnings), self.warnings
+        )
+        self._skins = read_skins(self._document, self._nodes, self._accessors, self.warnings)
+        self._choices: dict[PrimitiveKey, Choices] = {}
+        self._primitives: dict[tuple[int | None, Choices], list[PrimitiveKey]] = {}
+        self._bound_primitives: dict[tuple[PrimitiveKey, int], BoundPrimitive] = {}
         self._mesh_names: dict[str, int] = {}
         self._flattened: list[str] = []
         self._camera_names: dict[str, int] = {}
@@ -106,9 +116,10 @@ class _SceneBuilder:
         self.materials: list[ReadMaterial] = []
         self.meshes: list[Mesh] = []
         self.cameras: list[Camera] = []
-        self._warn_unsupported()
-        for node, to_world in walk_nodes(self._document, self.warnings):
-            self._add_node(node, to_world)
+        self._warn_animations()
+        self._list_primitives()
+        for placed in self._nodes:
+            self._add_node(placed)
         if self._flattened:
             num, first = len(self._flattened), self._flattened[0]
             message = f"{num:,} meshes are flattened by the scale of their nodes, for example {quote(first)}."
@@ -116,51 +127,102 @@ class _SceneBuilder:
         if len(self.meshes) > _MAX_SEPARATE_MESHES:
             self.meshes = merge_by_material(self.meshes)
         if not self.meshes:
-            raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
+            raise SceneError(
+                f"the scene has no triangles with an area{_list_faults(self.warnings)}; export at least one mesh"
+            )
         emissions = [np.array(read_material.emission) for read_material in self.materials]
         scene_materials = [read_material.material for read_material in self.materials]
         lit = self._collector.emissive_light(scene_materials, emissions, self.meshes)
         self.materials = [replace(u, material=material) for u, material in zip(self.materials, lit, strict=True)]
+        self._light_reader.warn_dim_lights(self._document.root.asset.generator)
         self.lights = self._collector.lights
         self.variants = self._read_variants()
         self._material_reader.warn_occlusion_maps()
+        warn_unknown_extensions(self._document, self.warnings)
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
 
-    def _add_node(self, node: Node, to_world: F64) -> None:
+    def _list_primitives(self) -> None:
+        """Group the primitives of visible nodes by material and its variants."""
+        for key in dict.fromkeys(key for placed in self._nodes for key in self._keys(placed)):
+            primitive = self._primitive(key)
+            label = self._document.meshes.label(key.mesh)
+            self._choices[key] = read_choices(primitive, label, self.warnings)
+            self._primitives.setdefault((primitive.material, self._choices[key]), []).append(key)
+
+    def _keys(self, placed: PlacedNode) -> list[PrimitiveKey]:
+        """The valid primitives of a visible node."""
+        node = placed.node
+        if node.mesh is None or not placed.is_visible:
+            return []
+        keys = []
+        try:
+            primitives = self._document.primitives(node.mesh)
+            weights = node.weights or self._document.meshes.get(node.mesh).weights
+        except SceneError as problem:
+            self._warn_once(f"A mesh was left out: {problem}.")
+            return []
+        for number in range(len(primitives)):
+            try:
+                primitive = primitives.get(number)
+            except SceneError as problem:
+                self._warn_once(f"A mesh was left out: {problem}.")
+                continue
+            is_skinned = node.skin in self._skins and "JOINTS_0" in primitive.attributes
+            is_morphed = bool(primitive.targets) and any(weights)
+            keys.append(
+                PrimitiveKey(node.mesh, number, weights if is_morphed else (), node.skin if is_skinned else None)
+            )
+        return keys
+
+    def _primitive(self, key: PrimitiveKey) -> Primitive:
+        return self._document.primitives(key.mesh).get(key.number)
+
+    def _warn_once(self, message: str) -> None:
+        if message not in self.warnings:
+            self.warnings.append(unsupported(message))
+
+    def _add_node(self, placed: PlacedNode) -> None:
+        node = placed.node
         if node.camera is not None:
-            self._add_camera(node, to_world)
-        self._light_reader.add(node, to_world)
-        if node.mesh is None:
+            self._add_camera(node, placed.to_world)
+        if not placed.is_visible:
             return
-        if node.mesh >= len(self._document.meshes):
-            raise SceneError(f"mesh {node.mesh} does not exist; export the scene again")
-        if node.skin is not None:
-            name = quote(node.name or self._document.meshes[node.mesh].name or "A mesh")
-            self.warnings.append(approximated(f"{name} is shown in its rest pose (skinning isn't supported)."))
-        mesh = self._document.meshes[node.mesh]
+        self._light_reader.add(node, self._document.nodes.label(placed.number), placed.to_world)
+        keys = self._keys(placed)
+        if node.mesh is None or not keys:
+            return
+        mesh_name = self._document.meshes.get(node.mesh).name
         instances = read_instances(node, self._accessors, self._remaining_instances, self.warnings)
-        self._remaining_instances -= len(mesh.primitives) * len(instances)
+        self._remaining_instances -= len(keys) * len(instances)
         if self._remaining_instances < 0:
             raise SceneError(f"the scene shows more than {MAX_INSTANCES:,} meshes; merge them (gltf-transform join)")
         for instance in instances:
-            for i, primitive in enumerate(mesh.primitives):
-                name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
-                self._add_primitive((node.mesh, i), primitive, name, to_world @ instance)
+            for key in keys:
+                name = unique_name(node.name or mesh_name or "mesh", self._mesh_names)
+                self._add_primitive(key, name, instance if key.skin is not None else placed.to_world @ instance)
 
-    def _read_geometry(self, key: Key, primitive: Primitive, name: str) -> GltfGeometry | None:
+    def _read_geometry(self, key: PrimitiveKey, name: str) -> GltfGeometry | None:
         if key not in self._geometry:
+            primitive = self._primitive(key)
             self._remaining_corners -= count_corners(self._document, primitive)
             if self._remaining_corners < 0:
                 raise SceneError(f"the file contains more than {MAX_TRIANGLES:,} triangles; simplify it")
-            self._accessors.unpack(primitive, f"mesh {quote(name)}")
-            self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {quote(name)}", self.warnings)
+            label = f"mesh {quote(name)}"
+            try:
+                geometry = read_primitive(self._accessors, primitive, key.weights, label, self.warnings)
+                if geometry is not None and key.skin is not None and geometry.joints is not None:
+                    geometry = skin_geometry(geometry, self._skins[key.skin], label)
+            except SceneError as problem:
+                self.warnings.append(unsupported(f"A mesh was left out: {problem}."))
+                geometry = None
+            self._geometry[key] = geometry
         return self._geometry[key]
 
-    def _add_primitive(self, key: Key, primitive: Primitive, name: str, to_world: F64) -> None:
-        if self._read_geometry(key, primitive, name) is None:
+    def _add_primitive(self, key: PrimitiveKey, name: str, to_world: F64) -> None:
+        if self._read_geometry(key, name) is None:
             return
-        material_index = self._find_material_index(key, primitive)
+        material_index = self._find_material_index(key)
         geometry = self._geometry[key]
         assert geometry is not None
         self._remaining_triangles -= len(geometry.faces)
@@ -168,7 +230,7 @@ class _SceneBuilder:
         if min(self._remaining_triangles, self._remaining_vertices) < 0:
             raise SceneError(f"the scene has more than {MAX_TRIANGLES:,} triangles; simplify it")
         num_dimensions = count_dimensions(to_world[:3, :3])
-        mesh = _make_world_mesh(self._bind_material(key, geometry, material_index), to_world, num_dimensions, name)
+        mesh = make_world_mesh(self._bind_material(key, geometry, material_index), to_world, num_dimensions, name)
         if mesh is not None and num_dimensions == 2:
             self._flattened.append(name)
         if mesh is None:
@@ -176,30 +238,38 @@ class _SceneBuilder:
         else:
             self.meshes.append(mesh)
 
-    def _bind_material(self, key: Key, geometry: GltfGeometry, material_index: int) -> _BoundPrimitive:
+    def _bind_material(self, key: PrimitiveKey, geometry: GltfGeometry, material_index: int) -> BoundPrimitive:
         """A primitive with its material, cached for all nodes that show it."""
         if (key, material_index) not in self._bound_primitives:
             read_material = self.materials[material_index]
+            self._warn_missing_uvs(key, geometry, read_material)
             uvs = read_material.uv_slot.apply(geometry.uvs, len(geometry.positions))
-            self._bound_primitives[key, material_index] = _BoundPrimitive(geometry, uvs, read_material, material_index)
+            self._bound_primitives[key, material_index] = BoundPrimitive(geometry, uvs, read_material, material_index)
         return self._bound_primitives[key, material_index]
 
-    def _find_material_index(self, key: Key, primitive: Primitive) -> int:
+    def _warn_missing_uvs(self, key: PrimitiveKey, geometry: GltfGeometry, read_material: ReadMaterial) -> None:
+        material, uv_set = read_material.material, read_material.uv_slot.uv_set
+        is_textured = material.textures or material.normal_map is not None or material.opacity is not None
+        if not is_textured or uv_set in geometry.uvs:
+            return
+        substitute = f"TEXCOORD_{min(geometry.uvs)} is used" if geometry.uvs else "its textures show one texel"
+        mesh = self._document.meshes.label(key.mesh)
+        self._warn_once(f"TEXCOORD_{uv_set} of {mesh}, for material {quote(material.name)}, is missing; {substitute}.")
+
+    def _find_material_index(self, key: PrimitiveKey) -> int:
         """Index of the primitive's material; one material with different variants counts as several."""
-        choices = self._choices[key]
-        material_key = (primitive.material, choices)
-        if material_key not in self._material_index:
-            self._material_index[material_key] = len(self.materials)
-            colors = self._vertex_colors(primitive.material, choices)
-            self.materials.append(self._read_material(primitive.material, colors))
-        return self._material_index[material_key]
+        material, choices = self._primitive(key).material, self._choices[key]
+        if (material, choices) not in self._material_index:
+            self._material_index[material, choices] = len(self.materials)
+            self.materials.append(self._read_material(material, self._vertex_colors(material, choices)))
+        return self._material_index[material, choices]
 
     def _vertex_colors(self, index: int | None, choices: Choices) -> VertexColors:
         """Vertex colors of a material's primitives; if they need an image, geometries get UV coordinates in it."""
-        primitives = self._primitives[index, choices]
-        if not any("COLOR_0" in primitive.attributes for _, primitive in primitives):
+        keys = self._primitives[index, choices]
+        if not any("COLOR_0" in self._primitive(key).attributes for key in keys):
             return WHITE
-        read = {key: self._read_geometry(key, primitive, f"of {key[0]}") for key, primitive in primitives}
+        read = {key: self._read_geometry(key, self._document.meshes.get(key.mesh).name or "mesh") for key in keys}
         geometries = {key: geometry for key, geometry in read.items() if geometry is not None}
         vertex_colors = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
         if not vertex_colors:
@@ -226,7 +296,7 @@ class _SceneBuilder:
         return VertexColors((red, green, blue, alpha))
 
     def _draw_textured_colors(
-        self, geometries: dict[Key, GltfGeometry], layout: TextureLayout
+        self, geometries: dict[PrimitiveKey, GltfGeometry], layout: TextureLayout
     ) -> TexturedColors | None:
         """Draw the vertex colors of geometries for a material with textures; they may get other UV coordinates."""
         uvs = {key: layout.slot.apply(g.uvs, len(g.positions)) for key, g in geometries.items()}
@@ -240,30 +310,34 @@ class _SceneBuilder:
             if not geometry.tangents.any():  # along the textures, not along the blocks
                 tangents = compute_tangents(geometry.positions, geometry.normals, uvs[key], geometry.faces)
                 geometry = replace(geometry, tangents=tangents)
-            self._geometry[key] = geometry.split_vertices(block)
+            self._geometry[key] = geometry.with_corner_uvs(block)
         return textured
 
-    def _draw_color_image(self, geometries: dict[Key, GltfGeometry]) -> TexturedColors:
+    def _draw_color_image(self, geometries: dict[PrimitiveKey, GltfGeometry]) -> TexturedColors:
         """Draw the vertex colors of geometries, and set their UV coordinates in the image."""
         colors_by_key = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
         corners = [colors[geometries[key].faces] for key, colors in colors_by_key.items()]
         image, uvs, white_uv = draw_color_image(np.concatenate(corners))
         uv_blocks = np.split(uvs, np.cumsum([len(block) for block in corners])[:-1])
         self._geometry |= {
-            key: geometries[key].split_vertices(block) for key, block in zip(colors_by_key, uv_blocks, strict=True)
+            key: geometries[key].with_corner_uvs(block) for key, block in zip(colors_by_key, uv_blocks, strict=True)
         }
         for key in geometries.keys() - colors_by_key.keys():
             white_uvs = np.tile(white_uv, (len(geometries[key].positions), 1))
-            self._geometry[key] = replace(geometries[key], uvs=(white_uvs,))
+            self._geometry[key] = replace(geometries[key], uvs={0: white_uvs})
         return TexturedColors(image, WRAP)
 
     def _read_material(self, index: int | None, colors: VertexColors = WHITE) -> ReadMaterial:
         return self._material_reader.read(self._gltf_material(index), colors)
 
     def _gltf_material(self, index: int | None) -> GltfMaterial:
-        if index is not None and index >= len(self._document.materials):
-            raise SceneError(f"material {index} does not exist; export the scene again")
-        return GltfMaterial(name="default") if index is None else self._document.materials[index]
+        if index is None:
+            return _DEFAULT_MATERIAL
+        try:
+            return self._document.materials.get(index)
+        except SceneError as problem:
+            self._warn_once(f"A material was replaced by the default: {problem}.")
+            return _DEFAULT_MATERIAL
 
     def _read_variants(self) -> dict[str, dict[str, Any]]:
         read_materials = {index: self.materials[number] for (index, _), number in self._material_index.items()}
@@ -272,12 +346,17 @@ class _SceneBuilder:
             index: read_materials.get(index) or self._read_material(index) for index in sorted(variant_indices)
         }
         scene_materials = [(self.materials[number], choices) for (_, choices), number in self._material_index.items()]
-        return variant_looks(variant_names(self._document), scene_materials, variant_materials, self.warnings)
+        return variant_looks(
+            variant_names(self._document, self.warnings), scene_materials, variant_materials, self.warnings
+        )
 
     def _add_camera(self, node: Node, to_world: F64) -> None:
-        if node.camera is None or node.camera >= len(self._document.cameras):
-            raise SceneError(f"camera {node.camera} does not exist; export the scene again")
-        camera = self._document.cameras[node.camera]
+        assert node.camera is not None
+        try:
+            camera = self._document.cameras.get(node.camera)
+        except SceneError as problem:
+            self.warnings.append(unsupported(f"A camera was left out: {problem}."))
+            return
         name = camera.name or node.name or "camera"
         frame = rigid_frame(to_world)
         if camera.perspective is None or camera.type != "perspective":
@@ -288,74 +367,19 @@ class _SceneBuilder:
             yfov, aspect = camera.perspective.yfov, camera.perspective.aspectRatio
             self.cameras.append(Camera(make_slug(name, self._camera_names), frame, yfov, aspect))
 
-    def _warn_unsupported(self) -> None:
-        document = self._document
-        if document.animations:
-            num_animations = len(document.animations)
+    def _warn_animations(self) -> None:
+        if num_animations := len(self._document.root.animations):
             animations = "1 animation was" if num_animations == 1 else f"{num_animations} animations were"
             self.warnings.append(ignored(f"{animations} ignored: objects are shown in their rest pose."))
-        for extension in document.extensionsRequired:
-            if extension not in SUPPORTED_EXTENSIONS:
-                message = f"The file requires {quote(extension)}, which isn't supported; it may look wrong."
-                self.warnings.append(unsupported(message))
 
 
-def _read_all_choices(document: Document) -> dict[Key, Choices]:
-    """The material variants of all primitives."""
-    return {
-        (m, i): read_choices(primitive)
-        for m, mesh in enumerate(document.meshes)
-        for i, primitive in enumerate(mesh.primitives)
-    }
-
-
-def _primitives_by_material(
-    document: Document, all_choices: Mapping[Key, Choices]
-) -> dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]]:
-    """Group primitives by material and its variants."""
-    primitives: dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]] = {}
-    for (m, i), choices in all_choices.items():
-        primitive = document.meshes[m].primitives[i]
-        primitives.setdefault((primitive.material, choices), []).append(((m, i), primitive))
-    return primitives
-
-
-def _make_world_mesh(bound: _BoundPrimitive, to_world: F64, num_dimensions: int, name: str) -> Mesh | None:
-    """Transform geometry to world space; None if the result is degenerate. Mirroring flips the faces."""
-    geometry, uvs, read_material, material_index = bound
-    linear = to_world[:3, :3]
-    positions = geometry.positions @ linear.T + to_world[:3, 3]
-    if num_dimensions < 2 or np.abs(positions).max() > MAX_COORDINATE:
-        return None
-    orientation = np.sign(determinant(linear)) if num_dimensions == 3 else 1.0
-    faces = geometry.faces if orientation > 0 else np.ascontiguousarray(geometry.faces[:, ::-1])
-    normals = _normalize(geometry.normals @ (orientation * cofactors(linear)).T)
-    if num_dimensions == 2:
-        faces = remove_degenerate(positions, faces)
-        normals = np.where(normals.any(axis=1, keepdims=True), normals, plane_normal(linear))
-        if not len(faces):
-            return None
-    tangents = np.zeros((len(positions), 4))
-    tangents[:, :3] = _normalize(geometry.tangents[:, :3] @ linear.T)
-    tangents[:, 3] = geometry.tangents[:, 3] * orientation
-    mesh = Mesh(
-        name,
-        positions.astype(np.float32),
-        normals.astype(np.float32),
-        tangents.astype(np.float32),
-        uvs,
-        faces,
-        material_index,
-    )
-    if read_material.material.normal_map is None and read_material.tangent_rotation is None:
-        return mesh
-    if not mesh.tangents.any():
-        mesh = replace(mesh, tangents=compute_tangents(mesh.positions, mesh.normals, mesh.uvs, faces))
-    if not read_material.tangent_rotation:
-        return mesh
-    return replace(mesh, tangents=rotate_tangents(mesh.tangents, mesh.normals, read_material.tangent_rotation))
-
-
-def _normalize(vectors: F64) -> F64:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0, length, 1))
+def _list_faults(warnings: Sequence[ImporterWarning]) -> str:
+    """The faults of a file in brackets, as many as fit into an error."""
+    faults = [str(warning).rstrip(".") for warning in warnings if warning.severity == "unsupported"]
+    total, listed = 0, list[str]()
+    for fault in faults:
+        total += len(fault)
+        if total <= _MAX_FAULTS or not listed:
+            listed.append(fault[:_MAX_FAULTS])
+    more = f"; and {len(faults) - len(listed):,} more" if len(faults) > len(listed) else ""
+    return f" ({'; '.join(listed)}{more})" if listed else ""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.document import Index, Node
 from relume.scene_io.gltf.nodes import rotations
+from relume.scene_io.gltf.tolerant import read_object
 
 F64 = NDArray[np.float64]
 
@@ -35,33 +36,23 @@ def read_instances(
     Args:
         node: node with or without the extension. accessors: accessors of the file.
         max_instances: allowed number of instances.
-        warnings: gets a sentence if the extension is invalid.
+        warnings: gets a sentence if the extension is invalid; the mesh then appears once.
     Returns:
         One identity if there is no extension.
     Raises:
-        SceneError: there are too many instances, or their attributes have different counts.
+        SceneError: there are too many instances.
     """
     if EXTENSION not in node.extensions:
         return np.eye(4)[None]
-    try:
-        attributes = Instancing.model_validate(node.extensions[EXTENSION]).attributes
-    except (ValidationError, RecursionError):
-        warnings.append(unsupported(f"The instances of {quote(node.name or 'node')} are invalid; it appears once."))
-        return np.eye(4)[None]
     label = f"instances of {quote(node.name or 'node')}"
-    arrays = {
-        name: accessors.floats(attributes[name], (width,), f"{name} of the {label}").astype(np.float64)
-        for name, width in _WIDTHS.items()
-        if name in attributes
-    }
-    counts = {len(values) for values in arrays.values()}
-    if not counts:
+    try:
+        arrays = _read_arrays(node, accessors, label, warnings)
+    except SceneError as problem:
+        warnings.append(unsupported(f"The {label} are invalid, so that it appears once: {problem}."))
         return np.eye(4)[None]
-    if len(counts) > 1:
-        raise SceneError(
-            f"the {label} have {sorted(counts)[0]} and {sorted(counts)[-1]} attribute values; export again"
-        )
-    (num_instances,) = counts
+    if not arrays:
+        return np.eye(4)[None]
+    num_instances = len(next(iter(arrays.values())))
     if num_instances > max_instances:
         raise SceneError(
             f"there are {num_instances:,} {label}, only {max_instances:,} more are allowed in the scene; use fewer"
@@ -77,3 +68,18 @@ def read_instances(
         num_skipped = np.count_nonzero(~is_usable)
         warnings.append(unsupported(f"Skipped {num_skipped:,} {label}: their positions or scales are out of range."))
     return np.asarray(transforms[is_usable])
+
+
+def _read_arrays(
+    node: Node, accessors: AccessorReader, label: str, warnings: list[ImporterWarning]
+) -> dict[str, Shaped[F64, "n width"]]:
+    attributes = read_object(Instancing, node.extensions[EXTENSION], f"{EXTENSION} of the {label}", warnings).attributes
+    arrays = {
+        name: accessors.floats(attributes[name], (width,), f"{name} of the {label}").astype(np.float64)
+        for name, width in _WIDTHS.items()
+        if name in attributes
+    }
+    counts = sorted({len(values) for values in arrays.values()})
+    if len(counts) > 1:
+        raise SceneError(f"they have {counts[0]} and {counts[-1]} attribute values; export the scene again")
+    return arrays

@@ -1,28 +1,29 @@
 """Material extensions beyond metallic-roughness as typed models.
 
-Specifications of KHR_materials_ior, _specular, _clearcoat, _sheen, _anisotropy, _emissive_strength,
-_transmission and _volume.
+Specifications of KHR_materials_ior, _specular, _clearcoat, _coat, _sheen, _fuzz, _anisotropy, _emissive_strength,
+_transmission, _volume, _unlit and _pbrSpecularGlossiness.
 """
 
 from __future__ import annotations
 
-import re
-from typing import Annotated, TypeVar
+from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
+from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.document import Extensions, Factor, Number, TextureInfo
+from relume.scene_io.gltf.tolerant import read_object
 
+Color = Annotated[list[Factor], Field(min_length=3, max_length=3)]
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
 Weights = Annotated[list[Weight], Field(min_length=3, max_length=3)]
-M = TypeVar("M", bound=BaseModel)
 
 
 class Ior(BaseModel, frozen=True):
     """KHR_materials_ior; 0 means a mirror."""
 
-    ior: Weight = 1.5
+    ior: Annotated[float, Field(allow_inf_nan=False, gt=-1e-6, le=1e6)] = 1.5
 
 
 class Specular(BaseModel, frozen=True):
@@ -47,7 +48,7 @@ class Clearcoat(BaseModel, frozen=True):
 class Sheen(BaseModel, frozen=True):
     """KHR_materials_sheen: fibers that scatter at grazing angles."""
 
-    sheenColorFactor: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
+    sheenColorFactor: Color = [0.0, 0.0, 0.0]  # noqa: N815
     sheenColorTexture: TextureInfo | None = None  # noqa: N815
     sheenRoughnessFactor: Factor = 0.0  # noqa: N815
     sheenRoughnessTexture: TextureInfo | None = None  # noqa: N815
@@ -79,23 +80,92 @@ class Volume(BaseModel, frozen=True):
 
     thicknessFactor: Weight = 0.0  # noqa: N815
     attenuationDistance: Annotated[float, Field(gt=0)] = float("inf")  # noqa: N815
-    attenuationColor: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [1.0, 1.0, 1.0]  # noqa: N815
+    attenuationColor: Color = [1.0, 1.0, 1.0]  # noqa: N815
+
+
+class Coat(BaseModel, frozen=True):
+    """KHR_materials_coat: a clear coat with a color and an index of refraction."""
+
+    coatFactor: Factor = 0.0  # noqa: N815
+    coatTexture: TextureInfo | None = None  # noqa: N815
+    coatRoughnessFactor: Factor = 0.0  # noqa: N815
+    coatRoughnessTexture: TextureInfo | None = None  # noqa: N815
+    coatNormalTexture: TextureInfo | None = None  # noqa: N815
+    coatIor: Annotated[float, Field(allow_inf_nan=False, ge=1, le=1e6)] = 1.5  # noqa: N815
+    coatColorFactor: Color = [1.0, 1.0, 1.0]  # noqa: N815
+    coatColorTexture: TextureInfo | None = None  # noqa: N815
+    coatDarkeningFactor: Factor = 0.0  # noqa: N815
+    coatAnisotropyStrength: Factor = 0.0  # noqa: N815
+
+
+class Fuzz(BaseModel, frozen=True):
+    """KHR_materials_fuzz: fibers on top of everything else."""
+
+    fuzzFactor: Factor = 0.0  # noqa: N815
+    fuzzTexture: TextureInfo | None = None  # noqa: N815
+    fuzzColorFactor: Color = [1.0, 1.0, 1.0]  # noqa: N815
+    fuzzColorTexture: TextureInfo | None = None  # noqa: N815
+    fuzzRoughnessFactor: Factor = 0.5  # noqa: N815
+    fuzzRoughnessTexture: TextureInfo | None = None  # noqa: N815
+
+
+class SpecularGlossiness(BaseModel, frozen=True):
+    """KHR_materials_pbrSpecularGlossiness, in place of metallic-roughness."""
+
+    diffuseFactor: Annotated[list[Factor], Field(min_length=4, max_length=4)] = [1.0, 1.0, 1.0, 1.0]  # noqa: N815
+    diffuseTexture: TextureInfo | None = None  # noqa: N815
+    specularFactor: Color = [1.0, 1.0, 1.0]  # noqa: N815
+    glossinessFactor: Factor = 1.0  # noqa: N815
+    specularGlossinessTexture: TextureInfo | None = None  # noqa: N815
+
+
+class Unlit(BaseModel, frozen=True):
+    """KHR_materials_unlit: the base color, whatever the light."""
 
 
 class MaterialExtensions(BaseModel, frozen=True):
-    """All supported extensions of one material."""
+    """All supported extensions of one material; None for those whose presence matters."""
 
     ior: Ior = Ior()
     specular: Specular = Specular()
     clearcoat: Clearcoat = Clearcoat()
+    coat: Coat | None = None
     sheen: Sheen = Sheen()
+    fuzz: Fuzz | None = None
     anisotropy: Anisotropy = Anisotropy()
     emissive_strength: EmissiveStrength = EmissiveStrength()
     transmission: Transmission = Transmission()
     volume: Volume = Volume()
+    unlit: Unlit | None = None
+    pbrSpecularGlossiness: SpecularGlossiness | None = None  # noqa: N815
 
 
-MATERIAL_EXTENSIONS = {f"KHR_materials_{name}" for name in MaterialExtensions.model_fields}
+MODELS: dict[str, type[BaseModel]] = {
+    "ior": Ior,
+    "specular": Specular,
+    "clearcoat": Clearcoat,
+    "coat": Coat,
+    "sheen": Sheen,
+    "fuzz": Fuzz,
+    "anisotropy": Anisotropy,
+    "emissive_strength": EmissiveStrength,
+    "transmission": Transmission,
+    "volume": Volume,
+    "unlit": Unlit,
+    "pbrSpecularGlossiness": SpecularGlossiness,
+}
+PREFIX = "KHR_materials_"
+MATERIAL_EXTENSIONS = {PREFIX + name for name in MODELS}
+DIFFERENCES = {
+    "iridescence": "its highlight has no interference colors",
+    "diffuse_transmission": "no diffuse light passes through it",
+    "diffuse_roughness": "its diffuse reflection is Lambert's",
+    "dispersion": "it refracts all colors alike",
+    "volume_scatter": "light is not scattered inside it",
+    "scatter": "light is not scattered inside it",
+    "subsurface": "light is not scattered inside it",
+}
+"""Known extensions without a term: what is different."""
 
 
 def read_extensions(extensions: Extensions, label: str, warnings: list[ImporterWarning]) -> MaterialExtensions:
@@ -106,28 +176,19 @@ def read_extensions(extensions: Extensions, label: str, warnings: list[ImporterW
         label: names the material in warnings.
         warnings: gets a sentence for each extension that is unsupported or invalid.
     """
-
-    def read(model: type[M]) -> M:
-        extension = f"KHR_materials_{re.sub('(?<=.)(?=[A-Z])', '_', model.__name__).lower()}"
+    values: dict[str, Any] = {}
+    for extension in sorted(extensions):
+        feature = extension.removeprefix(PREFIX)
+        if extension not in MATERIAL_EXTENSIONS:
+            is_material = feature != extension and feature.isidentifier() and len(feature) <= 60
+            name = (
+                feature[0].upper() + feature[1:].replace("_", " ") if is_material else f"Extension {quote(extension)}"
+            )
+            difference = DIFFERENCES.get(feature, "it may look different")
+            warnings.append(unsupported(f"{name} on {label} isn't supported; {difference}."))
+            continue
         try:
-            return model.model_validate(extensions.get(extension, {}))
-        except (ValidationError, RecursionError):
-            warnings.append(unsupported(f"Ignored {extension} of {label}: it is invalid."))
-            return model()
-
-    for extension in sorted(extensions.keys() - MATERIAL_EXTENSIONS):
-        feature = extension[:60].removeprefix("KHR_materials_")
-        is_material = feature != extension[:60] and feature.isidentifier()
-        name = feature[0].upper() + feature[1:].replace("_", " ") if is_material else f"Extension {quote(extension)}"
-        effect = "it is lit like any other material" if feature == "unlit" else "it may look different"
-        warnings.append(unsupported(f"{name} on {label} isn't supported; {effect}."))
-    return MaterialExtensions(
-        ior=read(Ior),
-        specular=read(Specular),
-        clearcoat=read(Clearcoat),
-        sheen=read(Sheen),
-        anisotropy=read(Anisotropy),
-        emissive_strength=read(EmissiveStrength),
-        transmission=read(Transmission),
-        volume=read(Volume),
-    )
+            values[feature] = read_object(MODELS[feature], extensions[extension], f"{extension} of {label}", warnings)
+        except SceneError as problem:
+            warnings.append(unsupported(f"An extension was left out: {problem}."))
+    return MaterialExtensions(**values)

@@ -25,9 +25,10 @@ from relume.scene_io.gltf.blend import MetallicBlend, lerp
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import TextureInfo
 from relume.scene_io.gltf.images import TextureSource
+from relume.scene_io.gltf.material_dialects import translate, without_textures
 from relume.scene_io.gltf.material_extensions import Clearcoat, MaterialExtensions, read_extensions
 from relume.scene_io.gltf.texture_resampling import Raster
-from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, dielectric_reflectance, make_terms
+from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, make_terms
 from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
 
 MAX_TEXTURE_TEXELS = 700_000_000  # of all materials of a scene, 3 bytes each
@@ -82,6 +83,7 @@ class MaterialReader:
         self._remaining_texels = MAX_TEXTURE_TEXELS
         self._occluded_materials: list[str] = []
         self._colors: TexturedColors | None = None  # of the material that is read
+        self._usable: dict[int, tuple[GltfMaterial, GltfMaterial, MaterialExtensions]] = {}
 
     def read(self, material: GltfMaterial, colors: VertexColors = WHITE) -> ReadMaterial:
         """Convert one material, with a unique name.
@@ -93,7 +95,7 @@ class MaterialReader:
         """
         name = unique_name(material.name or "material", self._names)
         label = f"material {quote(name)}"
-        extensions = read_extensions(material.extensions, label, self._warnings)
+        material, extensions = self._usable_parts(material)
         self._warn_unsupported(material, label)
         infos = [info for info in _infos(material, extensions) if info is not None]
         self._uv_transforms = UvTransforms(infos, label, self._warnings)
@@ -131,7 +133,7 @@ class MaterialReader:
     def texture_layout(self, material: GltfMaterial) -> TextureLayout | None:
         """Find where the textures of a material are; None if it has none that are used as images."""
         label = f"material {quote(material.name or 'material')}"
-        extensions = read_extensions(material.extensions, label, [])
+        material, extensions = self._usable_parts(material)
         infos = [info for info in _infos(material, extensions) if info is not None]
         if not infos:
             return None
@@ -140,6 +142,22 @@ class MaterialReader:
         shapes = [transforms.tile_image(info, pixels, wrap).shape for info, pixels, wrap in loaded]
         size = max(height for height, *_ in shapes), max(width for _, width, *_ in shapes)
         return TextureLayout(transforms.slot, size, loaded[0][2])
+
+    def _usable_parts(self, material: GltfMaterial) -> tuple[GltfMaterial, MaterialExtensions]:
+        """A material and its extensions as metallic-roughness, without the textures that cannot be read."""
+        key = id(material)
+        if key not in self._usable:
+            label = f"material {quote(material.name or 'material')}"
+            extensions = read_extensions(material.extensions, label, self._warnings)
+            translated, extensions = translate(material, extensions, label, self._warnings)
+
+            def is_usable(info: TextureInfo, name: str) -> bool:
+                return name == "occlusionTexture" or self._images.is_usable(info.index, f"the {name} of {label}")
+
+            parts = without_textures(translated, is_usable), without_textures(extensions, is_usable)
+            self._usable[key] = material, *parts  # the original, too, so that its id stays its own
+        _, usable, extensions = self._usable[key]
+        return usable, extensions
 
     def _transmission(self, extensions: MaterialExtensions, label: str) -> float:
         transmission = extensions.transmission
@@ -174,6 +192,8 @@ class MaterialReader:
         """Warn about an index of refraction that no opaque material has, unless it means a mirror."""
         ior, specular = extensions.ior.ior, extensions.specular
         reflectance = min(1.0, _f0(ior) * max(specular.specularColorFactor)) * specular.specularFactor
+        if extensions.pbrSpecularGlossiness is not None:  # f0 is the color, whatever the index
+            return
         if 0 < ior < 1 or reflectance > _f0(MAX_IOR):
             message = f"Unusual index of refraction {ior:g} on {label} (default 1.5): non-metallic parts reflect"
             self._warnings.append(unsupported(f"{message} {reflectance:.0%} of the light at normal incidence."))
@@ -215,14 +235,12 @@ class MaterialReader:
         factor = np.array(pbr.baseColorFactor[:3])
         dielectric = _f0(extensions.ior.ior) * np.array(specular.specularColorFactor)
         roughness = raster.mean("packed", 1) * pbr.roughnessFactor
-        specular_reflectance = dielectric_reflectance(
-            float(np.minimum(dielectric, 1).max()) * specular.specularFactor, specular.specularFactor
-        )
+        blend = MetallicBlend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
+        specular_reflectance = 0.0 if blend.reflectance_varies else blend.mean_reflectance()
         if raster.empty:
             metallic, weight = pbr.metallicFactor, specular.specularFactor
             f0 = lerp(weight * np.minimum(dielectric, 1), factor, metallic)
             return PbrSurface(factor * (1 - metallic), f0, lerp(weight, 1, metallic), roughness, specular_reflectance)
-        blend = MetallicBlend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
         textures = {"diffuse": self._count_texels(blend.diffuse())}
         if roughness > 0 and raster.varies("packed", 1):
             textures["roughness"] = self._count_texels(_normalize_roughness(raster))
@@ -255,6 +273,9 @@ class MaterialReader:
             for key, (info, texture_name) in infos.items()
             if info is not None
         }
+        glossy = extensions.pbrSpecularGlossiness
+        if glossy is not None and "tint" in images:
+            images["packed"] = _invert_glossiness(images["tint"][0], glossy.glossinessFactor), images["tint"][1]
         tiled = {key: info for key, (info, _) in infos.items()} | {"base": pbr.baseColorTexture}
         tiled_shapes = [
             images[key][0].shape for key, info in tiled.items() if info and self._uv_transforms.is_tiled(info)
@@ -272,11 +293,21 @@ class MaterialReader:
         sheen_roughness = sheen.sheenRoughnessFactor
         if sheen.sheenRoughnessTexture is not None:
             sheen_roughness *= self._mean(sheen.sheenRoughnessTexture, 3, f"sheen roughness texture of {label}")
-        tint = np.array(sheen.sheenColorFactor) * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {label}")
+        fuzz_weight = self._mean(extensions.fuzz.fuzzTexture, 0, f"fuzz texture of {label}") if extensions.fuzz else 1.0
+        tint = (
+            fuzz_weight
+            * np.array(sheen.sheenColorFactor)
+            * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {label}")
+        )
         r, g, b = (round(float(value), 6) for value in tint)
         if r + g + b > 0:
             self._warnings.append(approximated(f"Energy loss under the sheen of {label} is approximated."))
-        return CoatLayer(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
+        layer = CoatLayer(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
+        if extensions.coat is None:
+            return layer
+        color = self._mean_color(extensions.coat.coatColorTexture, f"coat color texture of {label}")
+        red, green, blue = lerp(1.0, color * extensions.coat.coatColorFactor, layer.coat).tolist()
+        return replace(layer, coat_f0=_f0(extensions.coat.coatIor), coat_color=(red, green, blue))
 
     def _anisotropy(self, extensions: MaterialExtensions, label: str) -> tuple[float, float]:
         """Strength, and angle from the tangent to the anisotropy direction in radians; (0, 0) if isotropic."""
@@ -368,6 +399,13 @@ def _normalize_roughness(raster: Raster) -> Texture:
     scale = 1 / raster.mean("packed", 1)
     pixels = np.ascontiguousarray(raster.channel("packed", 1))
     return Texture(pixels, raster.wrap, TextureEncoding("share", (scale, scale, scale)))
+
+
+def _invert_glossiness(pixels: NDArray[np.uint8], factor: float) -> NDArray[np.uint8]:
+    """A roughness image in the green channel, from glossiness in the alpha channel."""
+    packed = pixels.copy()
+    packed[..., 1] = np.rint(255 - factor * pixels[..., 3].astype(np.float64))
+    return packed
 
 
 def _f0(ior: float) -> float:

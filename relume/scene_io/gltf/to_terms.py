@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Shaped
@@ -29,6 +29,7 @@ F64 = NDArray[np.float64]
 COAT_F0 = 0.04
 _MEAN_RISE = 0.0036845  # mean of (1 - cos θd)^5 over both hemispheres, cosine-weighted
 Terms = tuple[dict[str, Any], ...]
+Reflectance = TypeVar("Reflectance", float, NDArray[np.float32])
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,19 @@ class PbrSurface:
 
 @dataclass(frozen=True)
 class CoatLayer:
-    """Modifications of the base layer: strength of anisotropy; weight and roughness of the coat; the sheen's."""
+    """Modifications of the base layer: strength of anisotropy; weight and roughness of the coat; the sheen's.
+
+    Attributes:
+        coat_f0: reflectance of the coat at normal incidence. coat_color: of light that passes the coat twice.
+    """
 
     anisotropy: float = 0.0
     coat: float = 0.0
     coat_roughness: float = 0.0
     sheen: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.0
+    coat_f0: float = COAT_F0
+    coat_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
@@ -78,16 +85,18 @@ def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
         layers = [_attenuate_below_sheen(layer, coat_layer) for layer in layers]
         layers.append(sheen_term(coat_layer.sheen, coat_layer.sheen_roughness))
     if coat_layer.coat > 0:
-        params = _clamp_params(TERMS["ggx"], roughness=coat_layer.coat_roughness, f0=COAT_F0)
+        f0 = coat_layer.coat_f0
+        params = _clamp_params(TERMS["ggx"], roughness=coat_layer.coat_roughness, f0=f0)
         layers = [
-            _attenuate(layer, "theta_o", lambda angle: 1 - coat_layer.coat * schlick(np.cos(angle), COAT_F0))
+            _attenuate(layer, "theta_o", lambda angle: 1 - coat_layer.coat * schlick(np.cos(angle), f0))
+            | {"color": _round_color(np.array(layer["color"]) * coat_layer.coat_color)}
             for layer in layers
         ]
         layers.append({"model": "ggx", "color": [coat_layer.coat] * 3, "params": params, "texture": None})
     return tuple(layers)
 
 
-def dielectric_reflectance(f0: float, f90: float) -> float:
+def dielectric_reflectance(f0: Reflectance, f90: Reflectance) -> Reflectance:
     """Mean reflectance of a dielectric with Schlick's F(θd) from f0 to f90."""
     return f0 + (f90 - f0) * _MEAN_RISE
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
+from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene.model import F32, U32
 from relume.scene_io.gltf.document import Index, Number, TextureInfo
+from relume.scene_io.gltf.tolerant import read_object
 
 U8 = NDArray[np.uint8]
 Wrap = tuple[str, str]
@@ -38,14 +40,19 @@ class UvSlot:
     uv_set: int = 0
     transform: UvTransform = field(default_factory=UvTransform)
 
-    def apply(self, sets: Sequence[Shaped[F32, "vertices 2"]], num_vertices: int) -> Shaped[F32, "vertices 2"]:
-        """Scale, rotate (counterclockwise with v down) and translate UV coordinates; zero if the set is missing."""
-        if self.uv_set >= len(sets):
+    def apply(self, sets: Mapping[int, Shaped[F32, "vertices 2"]], num_vertices: int) -> Shaped[F32, "vertices 2"]:
+        """Scale, rotate (counterclockwise with v down) and translate UV coordinates.
+
+        Args:
+            sets: by number; if the slot's is missing, the first one is used, or zeros.
+        """
+        if not sets:
             return np.zeros((num_vertices, 2), np.float32)
         p = self.transform
         c, s = np.cos(p.rotation), np.sin(p.rotation)
         rotation = np.array([[c, s], [-s, c]])
-        transformed = (sets[self.uv_set] * np.array(p.scale)) @ rotation.T + np.array(p.offset)
+        coordinates = sets.get(self.uv_set, sets[min(sets)])
+        transformed = (coordinates * np.array(p.scale)) @ rotation.T + np.array(p.offset)
         return np.asarray(np.clip(transformed, -1e6, 1e6), np.float32)
 
 
@@ -126,9 +133,9 @@ def _read_slot(texture: TextureInfo, label: str, warnings: list[ImporterWarning]
     if extension is None:
         return UvSlot(texture.texCoord)
     try:
-        transform = UvTransform.model_validate(extension)
-    except ValidationError:
-        warnings.append(unsupported(f"Ignored a texture transform of {label}: it is invalid."))
+        transform = read_object(UvTransform, extension, f"a texture transform of {label}", warnings)
+    except SceneError as problem:
+        warnings.append(unsupported(f"Ignored a texture transform: {problem}."))
         return UvSlot(texture.texCoord)
     uv_set = texture.texCoord if transform.texCoord is None else transform.texCoord
     return UvSlot(uv_set, transform.model_copy(update={"texCoord": None}))

@@ -7,23 +7,25 @@ is the same up to a color, and otherwise gets that image's mean.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from relume.brdf.term_validation import complete_term
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, quote
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.model import F32, Texture
 from relume.scene.texture_encoding import F64, decode_rows, mean_value
 from relume.scene.unique_names import unique_name
-from relume.scene_io.gltf.document import Document, Index, Name, Primitive
+from relume.scene_io.gltf.document import Document, Extensions, Index, Name, Primitive
 from relume.scene_io.gltf.materials import ReadMaterial
+from relume.scene_io.gltf.tolerant import read_object
 
 EXTENSION = "KHR_materials_variants"
 SAME_IMAGE = 0.01  # relative RMS; different compressions of an image differ by less
 Choices = tuple[tuple[int, int], ...]
+M = TypeVar("M", bound=BaseModel)
 
 
 class Variant(BaseModel, frozen=True):
@@ -51,32 +53,31 @@ class VariantMap(BaseModel, frozen=True):
     mappings: Annotated[list[VariantMaterial], Field(max_length=100, fail_fast=True)] = []
 
 
-def variant_names(document: Document) -> list[str]:
-    """Return unique names of the variants.
-
-    Raises:
-        SceneError: the extension is invalid.
-    """
+def variant_names(document: Document, warnings: list[ImporterWarning]) -> list[str]:
+    """Return unique names of the variants; none if the extension is invalid, with a warning."""
     used_names: dict[str, int] = {}
-    try:
-        extension = Variants.model_validate(document.extensions.get(EXTENSION, {}))
-    except ValidationError:
-        raise SceneError(f"{EXTENSION} of the file is invalid or has over 100 variants; export it again") from None
+    extension = _read(Variants, document.root.extensions, "the file", warnings)
     return [unique_name(variant.name or "variant", used_names) for variant in extension.variants]
 
 
-def read_choices(primitive: Primitive) -> Choices:
+def read_choices(primitive: Primitive, label: str, warnings: list[ImporterWarning]) -> Choices:
     """Return (variant, material) pairs for the variants that replace a primitive's material.
 
-    Raises:
-        SceneError: the extension is invalid.
+    Args:
+        primitive: from the document. label: names it in warnings.
+        warnings: gets a sentence if the extension is invalid; there are no pairs then.
     """
-    try:
-        extension = VariantMap.model_validate(primitive.extensions.get(EXTENSION, {}))
-    except ValidationError:
-        raise SceneError(f"{EXTENSION} of a mesh is invalid; export the scene again") from None
+    extension = _read(VariantMap, primitive.extensions, label, warnings)
     pairs = {variant: mapping.material for mapping in extension.mappings for variant in mapping.variants}
     return tuple(sorted((variant, index) for variant, index in pairs.items() if index != primitive.material))
+
+
+def _read(model: type[M], extensions: Extensions, label: str, warnings: list[ImporterWarning]) -> M:
+    try:
+        return read_object(model, extensions.get(EXTENSION, {}), f"{EXTENSION} of {label}", warnings)
+    except SceneError as problem:
+        warnings.append(unsupported(f"Material variants were left out: {problem}."))
+        return model()
 
 
 def variant_looks(
@@ -96,7 +97,7 @@ def variant_looks(
     looks: dict[str, dict[str, Any]] = {name: {"materials": {}} for name in names}
     for target, choices in scene_materials:
         for variant, index in choices:
-            if variant < len(names):
+            if 0 <= variant < len(names):
                 terms = _variant_terms(target, variant_materials[index], names[variant], warnings)
                 looks[names[variant]]["materials"][target.material.name] = {"terms": terms}
     return looks

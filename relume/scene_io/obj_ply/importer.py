@@ -178,7 +178,7 @@ def _add_obj_material(
     return (
         corners
         if slot == UvSlot()
-        else replace(corners, uvs=slot.apply([corners.uvs.astype(np.float32)], len(corners.uvs)).astype(float))
+        else replace(corners, uvs=slot.apply({0: corners.uvs.astype(np.float32)}, len(corners.uvs)).astype(float))
     )
 
 

@@ -14,7 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.core.folder_size import folder_bytes
-from relume.scene_io.import_options import ImportOptions, Recenter, Unit, UpAxis
+from relume.scene_io.import_options import ImportOptions, LightUnit, Recenter, Unit, UpAxis
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import CallerDep
 from relume_server.batch.bake_previews import MAX_WIDTH
@@ -56,6 +56,8 @@ Ground = Annotated[bool, Form(description="whether to add a ground plane that ca
 Up = Annotated[UpAxis, Form(description="axis of the file that points up")]
 FileUnit = Annotated[Unit, Form(description="unit of the file; auto guesses it from the size of the scene")]
 Recentered = Annotated[Recenter, Form(description="whether positions become relative to the middle of the scene")]
+FileLightUnit = Annotated[LightUnit, Form(description="unit of the file's point, spot and directional lights")]
+FileScene = Annotated[str, Form(max_length=200, description="name or number of a scene, of a glTF file with several")]
 Companions = Annotated[
     list[UploadFile],
     File(description="files that the scene references; file names include the folders"),
@@ -76,6 +78,8 @@ async def import_scene(
     up: Up = "file",
     unit: FileUnit = "file",
     recenter: Recentered = "auto",
+    light_unit: FileLightUnit = "file",
+    scene_name: FileScene = "",
 ) -> SceneBody:
     """Import a scene in a separate process; the body has a summary, and a warning for each unsupported feature."""
     if not name.isprintable():
@@ -95,7 +99,7 @@ async def import_scene(
         request = ImportRequest.create(
             services.settings, "scene", file, called, environment_path, scene.filename or "", companion_paths
         )
-        options = ImportOptions(up=up, unit=unit, recenter=recenter)
+        options = ImportOptions(up=up, unit=unit, recenter=recenter, light_unit=light_unit, scene_name=scene_name)
         return replace(request, ground=ground, options=options.document())
 
     identity = await services.import_queue.import_file(reservation, make_request)
