@@ -25,7 +25,9 @@ WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
 
 class TextureSource(Protocol):
-    """Textures by index, see `ImageReader.texture`."""
+    """Textures by index, see `ImageReader`."""
+
+    def is_usable(self, index: int, label: str) -> bool: ...
 
     def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]: ...
 

@@ -57,6 +57,10 @@ class _PackedTextures:
         self._textures.append(channels)
         return len(self._textures) - 1
 
+    def is_usable(self, index: int, label: str) -> bool:  # noqa: ARG002
+        """True: `SurfaceInputs` left out what cannot be read."""
+        return True
+
     def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]:
         """See `relume.scene_io.gltf.images.ImageReader.texture`."""
         channels = self._textures[index]
@@ -70,7 +74,7 @@ class _PackedTextures:
 
     def _layer(self, key: str, image: ImageInput, label: str) -> Shaped[U8, "height width channels"]:
         pixels = self._images.pixels(image.file, label)
-        assert pixels is not None  # `SurfaceInputs` left out the others
+        assert pixels is not None
         if key == "rgb" + _RAW:
             return pixels[..., :3]
         return color_bytes(pixels, image) if key == "rgb" else scalar_bytes(pixels, image)[..., None]
