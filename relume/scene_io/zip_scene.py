@@ -12,7 +12,9 @@ from relume.scene_io.referenced_files import MAX_BYTES, Archive, read_entry
 
 MAX_ENTRIES = 1_000
 MAX_DIRECTORY_BYTES = 1 << 20
+LAYER_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 SCENE_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+_USDZ_ALIGNMENT = 64  # bytes; of the content of each entry of a .usdz file
 TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
 
 
@@ -32,13 +34,36 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
         raise SceneError("the .zip file is damaged; pack it again") from None
     entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
     _check_entries(entries)
+    scene = _find_scene(data, entries)
+    folder = posixpath.dirname(scene.filename.replace("\\", "/"))
+    return read_entry(archive, scene), Archive(archive, folder)
+
+
+def _find_scene(data: bytes, entries: list[zipfile.ZipInfo]) -> zipfile.ZipInfo:
+    """The only scene file; of USD layers the first of a .usdz file, otherwise the only one in the uppermost folder."""
     scenes = [entry for entry in entries if entry.filename.lower().endswith(SCENE_SUFFIXES)]
+    layers = [entry for entry in entries if entry.filename.lower().endswith(LAYER_SUFFIXES)]
+    if layers and not scenes:
+        if _is_usdz(data, entries[0]):
+            return entries[0]
+        depth = min(entry.filename.count("/") for entry in layers)
+        scenes = [entry for entry in layers if entry.filename.count("/") == depth]
+        if len(scenes) > 1:
+            message = f"the .zip file contains {len(scenes)} USD layers side by side; leave only the one of the scene"
+            raise SceneError(f"{message} there, move the others into a folder, or pack a .usdz file")
     if len(scenes) != 1:
         raise SceneError(
-            f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj, .ply or .stl"
+            f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj, .ply, .stl or .usd"
         )
-    folder = posixpath.dirname(scenes[0].filename.replace("\\", "/"))
-    return read_entry(archive, scenes[0]), Archive(archive, folder)
+    return scenes[0]
+
+
+def _is_usdz(data: bytes, first: zipfile.ZipInfo) -> bool:
+    """True if the first entry of an archive is a layer at the place that .usdz files require."""
+    header = data[first.header_offset : first.header_offset + 30]
+    start = first.header_offset + 30 + int.from_bytes(header[26:28], "little") + int.from_bytes(header[28:30], "little")
+    is_layer = first.filename.lower().endswith(LAYER_SUFFIXES)
+    return is_layer and first.compress_type == zipfile.ZIP_STORED and start % _USDZ_ALIGNMENT == 0
 
 
 def _check_entries(entries: list[zipfile.ZipInfo]) -> None:

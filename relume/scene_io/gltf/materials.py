@@ -8,9 +8,10 @@ appendix B, and the specifications of the extensions.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -24,7 +25,7 @@ from relume.scene.validate import MAX_IOR
 from relume.scene_io.gltf.blend import MetallicBlend, lerp
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import TextureInfo
-from relume.scene_io.gltf.images import ImageReader
+from relume.scene_io.gltf.images import U8
 from relume.scene_io.gltf.material_extensions import Clearcoat, MaterialExtensions, read_extensions
 from relume.scene_io.gltf.texture_resampling import Raster
 from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, dielectric_reflectance, make_terms
@@ -72,10 +73,17 @@ class ReadMaterial:
 WHITE = VertexColors()
 
 
+class TextureSource(Protocol):
+    """Textures by the index that a `TextureInfo` has."""
+
+    def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]:
+        """Return the RGBA bytes of a texture and its wrap modes along u and v; see `ImageReader.texture`."""
+
+
 class MaterialReader:
     """Converts the materials of one file, with a limit on their texels."""
 
-    def __init__(self, images: ImageReader, warnings: list[ImporterWarning]) -> None:
+    def __init__(self, images: TextureSource, warnings: list[ImporterWarning]) -> None:
         self._images = images
         self._warnings = warnings
         self._names: dict[str, int] = {}
