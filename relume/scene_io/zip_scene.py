@@ -34,28 +34,40 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
         raise SceneError("the .zip file is damaged; pack it again") from None
     entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
     _check_entries(entries)
-    scene = _find_scene(data, entries)
+    scene = _find_scene(data, entries, archive)
     folder = posixpath.dirname(scene.filename.replace("\\", "/"))
     return read_entry(archive, scene), Archive(archive, folder)
 
 
-def _find_scene(data: bytes, entries: list[zipfile.ZipInfo]) -> zipfile.ZipInfo:
-    """The only scene file; of USD layers the first of a .usdz file, otherwise the only one in the uppermost folder."""
+def _find_scene(data: bytes, entries: list[zipfile.ZipInfo], archive: zipfile.ZipFile) -> zipfile.ZipInfo:
+    """The only scene file; of USD layers the first of a .usdz file, otherwise the one that no other names."""
     scenes = [entry for entry in entries if entry.filename.lower().endswith(SCENE_SUFFIXES)]
     layers = [entry for entry in entries if entry.filename.lower().endswith(LAYER_SUFFIXES)]
     if layers and not scenes:
         if _is_usdz(data, entries[0]):
             return entries[0]
-        depth = min(entry.filename.count("/") for entry in layers)
-        scenes = [entry for entry in layers if entry.filename.count("/") == depth]
-        if len(scenes) > 1:
-            message = f"the .zip file contains {len(scenes)} USD layers side by side; leave only the one of the scene"
-            raise SceneError(f"{message} there, move the others into a folder, or pack a .usdz file")
+        scenes = [_find_root_layer(layers, archive)]
     if len(scenes) != 1:
         raise SceneError(
             f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj, .ply, .stl or .usd"
         )
     return scenes[0]
+
+
+def _find_root_layer(layers: list[zipfile.ZipInfo], archive: zipfile.ZipFile) -> zipfile.ZipInfo:
+    """The layer that no other layer names; of several, the only one in the uppermost folder."""
+    from relume.scene_io.usd.layers import find_roots  # which opens packages itself
+
+    if len(layers) == 1:
+        return layers[0]
+    roots = find_roots({entry.filename: read_entry(archive, entry) for entry in layers})
+    depth = min((name.count("/") for name in roots), default=0)
+    upper = [name for name in roots if name.count("/") == depth]
+    if len(upper) != 1:
+        listed = ", ".join(sorted(upper)[:5])
+        message = f"the .zip file contains {len(upper)} USD scenes side by side ({listed}); leave one of them"
+        raise SceneError(f"{message}, or pack it as .usdz")
+    return next(entry for entry in layers if entry.filename == upper[0])
 
 
 def _is_usdz(data: bytes, first: zipfile.ZipInfo) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
-from relume.scene.finalize import finalize
+from relume.scene.finalize import finalize, no_triangles
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import Camera, Mesh, Scene
 from relume.scene.unique_names import unique_name
@@ -37,9 +38,12 @@ from relume.scene_io.usd.layers import INSTALL, LayerFolder
 from relume.scene_io.usd.lights import KINDS, UsdLightReader, radiance
 from relume.scene_io.usd.materials import MaterialKey, UsdMaterial, UsdMaterialReader, bound_material, display_colors
 from relume.scene_io.usd.meshes import MeshReader
+from relume.scene_io.usd.networks import Numbers
 from relume.scene_io.usd.polygon_mesh import NORMALS, Primvar, Triangles, make_triangles
 from relume.scene_io.usd.primvars import read_primvars
 from relume.scene_io.usd.shapes import shape_mesh
+from relume.scene_io.usd.skinning import bake_skinning
+from relume.scene_io.usd.surface import Surface
 
 F64 = NDArray[np.float64]
 MAX_PRIMS = 1_000_000
@@ -108,7 +112,9 @@ class _StageReader:
         from pxr import Usd, UsdGeom
 
         self._stage, self._options, self._warnings = stage, options, warnings
-        self._time = Usd.TimeCode.EarliestTime()
+        has_range = stage.HasAuthoredTimeCodeRange()
+        self._time = Usd.TimeCode(stage.GetStartTimeCode()) if has_range else Usd.TimeCode.EarliestTime()
+        bake_skinning(stage, self._time, warnings)
         self._transforms = UsdGeom.XformCache(self._time)
         self._images = UsdImages(layers, warnings)
         self._mesh_reader = MeshReader(self._time, warnings)
@@ -126,11 +132,11 @@ class _StageReader:
         self._visit(self._stage.GetPseudoRoot(), root, self._transforms.GetLocalToWorldTransform, 0)
         self._warn_stage()
         if not self._shapes:
-            raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
+            raise SceneError(no_triangles(self._warnings))
         origin = self._recenter()
         materials, meshes = self._materials_and_meshes(meters, origin)
         if not meshes:
-            raise SceneError("the scene has no triangles with an area; export at least one mesh made of triangles")
+            raise SceneError(no_triangles(self._warnings))
         if len(meshes) > _MAX_SEPARATE_MESHES:
             meshes = merge_by_material(meshes)
         collector = LightCollector(self._warnings)
@@ -187,7 +193,18 @@ class _StageReader:
             if prim.IsA(UsdGeom.PointInstancer):
                 prims.PruneChildren()
             if is_shown:
-                self._add(prim, base @ np.array(transform(prim)).T, nesting)
+                with self._only_costing(prim):
+                    self._add(prim, base @ np.array(transform(prim)).T, nesting)
+
+    @contextmanager
+    def _only_costing(self, prim: Any) -> Iterator[None]:
+        """Turn an error of USD into a warning about one prim."""
+        from pxr import Tf
+
+        try:
+            yield
+        except Tf.ErrorException:
+            self._warnings.append(unsupported(f"Skipped {quote(prim.GetName())}: USD cannot read it."))
 
     def _add(self, prim: Any, to_world: F64, nesting: int) -> None:
         from pxr import UsdGeom
@@ -303,16 +320,19 @@ class _StageReader:
 
     def _materials_and_meshes(self, meters: float, origin: F64) -> tuple[list[UsdMaterial], list[Mesh]]:
         reader = UsdMaterialReader(self._stage, self._time, meters, self._images, self._warnings)
-        by_key: dict[MaterialKey, list[_Shape]] = {}
+        surfaces: dict[MaterialKey, tuple[str, Surface]] = {}
+        groups: dict[tuple[str, Surface, Numbers | None], list[_Shape]] = {}
         for shape in self._shapes:
-            by_key.setdefault(shape.key, []).append(shape)
+            if shape.key not in surfaces:
+                surfaces[shape.key] = reader.surface(shape.key, shape.name)
+            groups.setdefault((*surfaces[shape.key], shape.key.color), []).append(shape)
         materials, meshes = list[UsdMaterial](), list[Mesh]()
         names: dict[str, int] = {}
-        for key, shapes in by_key.items():
+        for (material_name, surface, _), shapes in groups.items():
             unique = list({id(shape.triangles): shape.triangles for shape in shapes}.values())
             low, high = _bounds(shapes[0])
-            is_double_sided = any(shape.double_sided for shape in shapes)
-            material = reader.read(key, shapes[0].name, unique, float((high - low).min()), double_sided=is_double_sided)
+            thickness, is_double_sided = float((high - low).min()), any(shape.double_sided for shape in shapes)
+            material = reader.read(material_name, surface, unique, thickness, double_sided=is_double_sided)
             for shape in shapes:
                 mesh = self._make_mesh(shape, material, len(materials), origin, unique_name(shape.name, names))
                 meshes.extend([] if mesh is None else [mesh])

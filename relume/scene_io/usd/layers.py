@@ -10,6 +10,8 @@ from __future__ import annotations
 import codecs
 import posixpath
 import re
+import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +20,10 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.obj_ply.material_maker import printable, read_companion
 from relume.scene_io.referenced_files import Archive, Companions
+from relume.scene_io.usd.materialx_layers import write_materialx_layer
 from relume.scene_io.zip_scene import LAYER_SUFFIXES, open_zip
 
+MATERIALX_SUFFIX = ".mtlx"
 MAX_LAYERS = 1_000
 MAX_DEPTH = 32  # of packages and layers that name one another
 MAGIC = (b"PXR-USDC", b"#usda", b"#sdf")  # crate, and text
@@ -31,6 +35,45 @@ INSTALL = "USD files need usd-core: pip install relume[usd]"
 def is_usd(data: bytes) -> bool:
     """True if bytes are a layer: text or crate."""
     return data.removeprefix(codecs.BOM_UTF8).startswith(MAGIC)
+
+
+def find_roots(layers: Mapping[str, bytes]) -> list[str]:
+    """Names of the layers that no other one names, without those that are damaged.
+
+    Args:
+        layers: contents by their paths in an archive.
+    """
+    named: set[str] = set()
+    readable: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (name, data) in enumerate(layers.items()):
+            layer = _open_layer(data, Path(folder) / f"layer-{number}.usd")
+            if layer is not None:
+                readable.append(name)
+                paths = (path.split(FORMAT_ARGUMENTS)[0].partition("[")[0] for path in _paths(layer))
+                joined = (posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) for path in paths)
+                named |= {path for path in joined if path != name}
+    return [name for name in readable if name not in named]
+
+
+def _open_layer(data: bytes, path: Path) -> Any:
+    """Write a layer, and open it; None if it is damaged."""
+    from pxr import Sdf, Tf
+
+    path.write_bytes(data.removeprefix(codecs.BOM_UTF8))
+    try:
+        return Sdf.Layer.FindOrOpen(str(path)) if is_usd(data) else None
+    except Tf.ErrorException:
+        return None
+
+
+def _paths(layer: Any) -> list[str]:
+    """All names of files in a layer."""
+    from pxr import UsdUtils
+
+    paths: dict[str, str] = {}
+    UsdUtils.ModifyAssetPaths(layer, lambda path: paths.setdefault(path, path))
+    return [*paths]
 
 
 @dataclass(frozen=True)
@@ -90,26 +133,27 @@ class LayerFolder:
 
     def _add(self, data: bytes, companions: Companions, folder: str, depth: int) -> str:
         """Write a layer and those that it names; return its private name, empty if it is damaged."""
-        from pxr import Sdf, Tf, UsdUtils
-
-        if len(self._layers) == MAX_LAYERS or depth > MAX_DEPTH:
-            raise SceneError(f"the USD file has more than {MAX_LAYERS:,} layers or nests them too deeply; flatten it")
-        name = f"layer-{len(self._layers)}.usd"
-        path = self._path / name
-        path.write_bytes(data.removeprefix(codecs.BOM_UTF8))
-        try:
-            layer = Sdf.Layer.FindOrOpen(str(path)) if is_usd(data) else None
-        except Tf.ErrorException:
-            layer = None
+        name = self._next_name(depth)
+        layer = _open_layer(data, self._path / name)
         if layer is None:
             return ""
+        self._keep(name, layer, companions, folder, depth)
+        return name
+
+    def _next_name(self, depth: int) -> str:
+        """The private name of the next layer. Raises SceneError if there are too many."""
+        if len(self._layers) == MAX_LAYERS or depth > MAX_DEPTH:
+            raise SceneError(f"the USD file has more than {MAX_LAYERS:,} layers or nests them too deeply; flatten it")
+        return f"layer-{len(self._layers)}.usd"
+
+    def _keep(self, name: str, layer: Any, companions: Companions, folder: str, depth: int) -> None:
+        """Store a layer, and replace the names of files in it."""
+        from pxr import UsdUtils
+
         self._layers[name] = layer
-        paths: dict[str, str] = {}
-        UsdUtils.ModifyAssetPaths(layer, lambda path: paths.setdefault(path, path))
-        paths = {path: self._private_path(path, companions, folder, depth) for path in paths}
+        paths = {path: self._private_path(path, companions, folder, depth) for path in _paths(layer)}
         UsdUtils.ModifyAssetPaths(layer, lambda path: paths.get(path, ""))
         _remove_clips(layer, self._warnings)
-        return name
 
     def _private_path(self, path: str, companions: Companions, folder: str, depth: int) -> str:
         """The private path of a file that a layer names; empty if it is missing."""
@@ -120,7 +164,7 @@ class LayerFolder:
             if package is None:
                 return ""
             asset = Asset(package[1], posixpath.relpath(inner, package[1].folder or "."))
-        if not asset.name.lower().endswith(LAYER_SUFFIXES):
+        if not asset.name.lower().endswith((*LAYER_SUFFIXES, MATERIALX_SUFFIX)):
             key = f"asset-{len(self.assets)}"
             self.assets[key] = asset
             return key
@@ -136,9 +180,23 @@ class LayerFolder:
         data = self.read(asset, "layer")
         if data is None:
             return ""
-        name = self._add(data, asset.companions, posixpath.dirname(asset.name), depth)
+        folder = posixpath.dirname(asset.name)
+        if asset.name.lower().endswith(MATERIALX_SUFFIX):
+            return self._add_materialx(data, asset, folder, depth)
+        name = self._add(data, asset.companions, folder, depth)
         if not name:
             self._warnings.append(unsupported(f"Skipped the layer “{printable(asset.name)}”: it is damaged."))
+        return name
+
+    def _add_materialx(self, data: bytes, asset: Asset, folder: str, depth: int) -> str:
+        """Add a MaterialX document as a layer; return its private name, empty if it cannot be used."""
+        name = self._next_name(depth)
+        try:
+            layer = write_materialx_layer(data, str(self._path / name))
+        except SceneError as error:
+            self._warnings.append(unsupported(f"Skipped “{printable(asset.name)}”: {error}."))
+            return ""
+        self._keep(name, layer, asset.companions, folder, depth)
         return name
 
     def _open_package(self, asset: Asset) -> tuple[bytes, Archive] | None:
@@ -154,7 +212,8 @@ class LayerFolder:
 
     def read(self, asset: Asset, kind: str) -> bytes | None:
         """Read a file; None with a warning if it is missing. kind: "image" or "layer"."""
-        return read_companion(asset.companions, "", asset.name, "a texture", self._warnings, kind)
+        label = "a texture" if kind == "image" else "a layer"
+        return read_companion(asset.companions, "", asset.name, label, self._warnings, kind)
 
 
 def _remove_clips(layer: Any, warnings: list[ImporterWarning]) -> None:

@@ -64,28 +64,31 @@ class UsdMaterialReader:
         self._images, self._warnings = images, warnings
         self._reader = MaterialReader(images, warnings)
 
-    def read(
-        self, key: MaterialKey, name: str, shapes: Sequence[Triangles], thickness: float, *, double_sided: bool
-    ) -> UsdMaterial:
-        """Read a material.
-
-        Args:
-            key: of the material. name: for prims without one. shapes: all triangles that have it.
-            thickness: of the solids that it bounds, meters. double_sided: whether a prim shows both sides.
-        """
+    def surface(self, key: MaterialKey, name: str) -> tuple[str, Surface]:
+        """Read the name and the shader of a material. name: for prims without one."""
         from pxr import UsdShade
 
         surface = UNBOUND
         if key.path:
             material = UsdShade.Material(self._stage.GetPrimAtPath(key.path))
             name = material.GetPrim().GetName()
-            label = f"material {quote(name)}"
-            surface = ShaderReader(self._time, self._meters, label, self._warnings).read(material, thickness)
-        label = f"material {quote(name)}"
+            surface = ShaderReader(self._time, self._meters, f"material {quote(name)}", self._warnings).read(material)
         if key.emission is not None:
             surface = replace(surface, emission=key.emission, emission_scale=1.0)
+        return name, surface
+
+    def read(
+        self, name: str, surface: Surface, shapes: Sequence[Triangles], thickness: float, *, double_sided: bool
+    ) -> UsdMaterial:
+        """Make a material.
+
+        Args:
+            name, surface: from `surface`. shapes: all triangles that have it. thickness: of the solids that it bounds,
+                meters. double_sided: whether a prim shows both sides.
+        """
+        label = f"material {quote(name)}"
         converter = SurfaceConverter(self._images, label, self._warnings)
-        gltf_material = converter.convert(surface, name, double_sided=double_sided)
+        gltf_material = converter.convert(surface, name, thickness, double_sided=double_sided)
         colors, color_uvs = VertexColors(), dict[int, F32]()
         if surface.uses_display_color:
             colors, color_uvs = self._colors(shapes, label, has_textures=bool(converter.uv_names))
@@ -135,7 +138,8 @@ def bound_material(prim: Any, warnings: list[ImporterWarning]) -> str:
     for purpose in (UsdShade.Tokens.full, UsdShade.Tokens.preview):
         material, _ = binding.ComputeBoundMaterial(purpose)
         if material:
-            return str(material.GetPath())
+            shared = material.GetPrim().GetPrimInPrototype()  # by all instances
+            return str((shared or material.GetPrim()).GetPath())
     path = binding.GetDirectBinding().GetMaterialPath()
     if not path.isEmpty:
         message = f"Material {quote(path.name)} of {quote(prim.GetName())} is missing; it has its display color."

@@ -15,7 +15,7 @@ from relume.scene_io.usd.primvars import as_rows, read_primvars
 from relume.scene_io.usd.subdivision import MAX_LEVELS, Creases, subdivide
 
 I64 = NDArray[np.int64]
-MAX_REFINED = 400_000  # quadrilaterals of one mesh after its subdivision
+MAX_REFINED = 100_000  # quadrilaterals of one mesh after its subdivision
 
 
 class MeshReader:
@@ -24,7 +24,7 @@ class MeshReader:
     def __init__(self, time: Any, warnings: list[ImporterWarning]) -> None:
         self._time, self._warnings = time, warnings
         self._num_refined = 0
-        self._remaining_quads = MAX_TRIANGLES // 4  # of all subdivided meshes
+        self._remaining_quads = MAX_TRIANGLES // 8  # of all subdivided meshes
 
     def read(self, prim: Any, label: str) -> Triangles | None:
         """Read a mesh; None with a warning if it has no faces.

@@ -108,10 +108,10 @@ class NetworkReader:
                 return self._constant(attribute)
             node = UsdShade.Shader(attribute.GetPrim())
             return self._read_node(node, UsdShade.Output(attribute).GetBaseName(), name, depth)
-        if usd_input.HasConnectedSource() or usd_input.GetRawConnectedSourcePaths():
-            message = f"{quote(name)} of {self._label} is connected to nothing that exists; it has its default."
-            self._warnings.append(unsupported(message))
-        return self._constant(usd_input.GetAttr())
+        sources = usd_input.GetRawConnectedSourcePaths()
+        if any(not shader.GetPrim().GetStage().GetPrimAtPath(path.GetPrimPath()) for path in sources):
+            self._warn(name, "is connected to nothing that exists")
+        return None if sources else self._constant(usd_input.GetAttr())
 
     def numbers(self, shader: Any, name: str, default: Numbers, depth: int = 0) -> Numbers:
         """Read an input that must be constant."""
@@ -148,16 +148,8 @@ class NetworkReader:
 
     def _read_node(self, node: Any, output: str, name: str, depth: int) -> Value:
         identifier = str(node.GetIdAttr().Get(self._time) or "")
-        kind = identifier.split("_")[0]
-        if kind == "ND":
-            kind = (
-                "_".join(identifier.split("_")[:2]) if not identifier.startswith("ND_gltf_image") else "ND_gltf_image"
-            )
-        if identifier.startswith("ND_UsdUVTexture"):
-            kind = "UsdUVTexture"
-        if identifier.startswith("ND_UsdPrimvarReader"):
-            kind = "UsdPrimvarReader"
-        reader = self._readers.get(kind)
+        kind = identifier.removeprefix("ND_") if identifier.startswith("ND_Usd") else identifier
+        reader = next((reader for prefix, reader in self._readers.items() if kind.startswith(prefix)), None)
         if reader is None:
             self._warn(
                 name, f"comes from the node {quote(identifier or node.GetPrim().GetName())}, which isn't supported"
@@ -175,7 +167,7 @@ class NetworkReader:
         has_fallback = bool(shader.GetInput("fallback"))
         constant = tuple(fallback[channel] for channel in channels) if has_fallback else None
         if not asset:
-            self._warn(output, "has a texture without a file")
+            self._warnings.append(unsupported(f"A texture of {self._label} has no file."))
             return constant
         wraps = [self.text(shader, name, "useMetadata", depth) for name in ("wrapS", "wrapT")]
         if "black" in wraps:
@@ -265,7 +257,7 @@ class NetworkReader:
         fallback = self.read(shader, "default", depth)
         constant = fallback if isinstance(fallback, tuple) else None
         if not asset:
-            self._warn(output, "has an image without a file")
+            self._warnings.append(unsupported(f"A texture of {self._label} has no file."))
             return constant
         identifier = str(shader.GetIdAttr().Get(self._time))
         num_channels = {"float": 1, "vector2": 2}.get(identifier.rsplit("_", 1)[-1], 3)

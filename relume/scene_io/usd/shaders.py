@@ -28,21 +28,17 @@ class ShaderReader:
         self._time, self._meters, self._label, self._warnings = time, meters, label, warnings
         self._network = NetworkReader(time, label, warnings)
 
-    def read(self, material: Any, thickness: float) -> Surface:
-        """Read a material; gray with a warning if its shader is not supported.
-
-        Args:
-            material: a UsdShade.Material. thickness: of the solids that it bounds, meters.
-        """
+    def read(self, material: Any) -> Surface:
+        """Read a UsdShade.Material; gray with a warning if its shader is not supported."""
         shaders = [shader for context in ("", MATERIALX) if (shader := self._surface_source(material, context))]
         identifiers = [str(shader.GetIdAttr().Get(self._time) or "") for shader in shaders]
         for shader, identifier in zip(shaders, identifiers, strict=True):
             if identifier in PREVIEW:
                 return self._preview_surface(shader)
             if identifier.startswith("ND_standard_surface"):
-                return self._standard_surface(shader, thickness)
+                return self._standard_surface(shader)
             if identifier.startswith("ND_open_pbr_surface"):
-                return self._open_pbr_surface(shader, thickness)
+                return self._open_pbr_surface(shader)
         reason = f"its shader {quote(identifiers[0])} isn't supported" if identifiers else "it has no surface shader"
         self._warnings.append(unsupported(f"{self._label[0].upper()}{self._label[1:]} is shown gray: {reason}."))
         return Surface()
@@ -87,7 +83,7 @@ class ShaderReader:
             transparency=transparency,
         )
 
-    def _standard_surface(self, shader: Any, thickness: float) -> Surface:
+    def _standard_surface(self, shader: Any) -> Surface:
         """Autodesk Standard Surface 1.0.1."""
         number, value, color = self._number, self._value, self._network.numbers
         self._warn_ignored(shader, {"subsurface": 0.0, "thin_film_thickness": 0.0, "transmission_scatter": 0.0})
@@ -95,6 +91,8 @@ class ShaderReader:
         transmission = number(shader, "transmission", 0.0)
         tint = color(shader, "transmission_color", (1.0, 1.0, 1.0))
         base = self._scaled(value(shader, "base_color", (0.8, 0.8, 0.8)), number(shader, "base", 1.0))
+        coat = value(shader, "coat", (0.0,))
+        base = self._below_coat(base, coat, value(shader, "coat_color", (1.0, 1.0, 1.0)))
         return Surface(
             base_color=self._transmitted(base, transmission, tint, depth),
             metallic=value(shader, "metalness", (0.0,)),
@@ -106,7 +104,7 @@ class ShaderReader:
             ior=self._ior(number(shader, "specular_IOR", 1.5)),
             specular_weight=number(shader, "specular", 1.0),
             specular_tint=color(shader, "specular_color", (1.0, 1.0, 1.0)),
-            coat=value(shader, "coat", (0.0,)),
+            coat=coat,
             coat_roughness=value(shader, "coat_roughness", (0.1,)),
             sheen_color=tuple(
                 number(shader, "sheen", 0.0) * channel for channel in color(shader, "sheen_color", (1.0, 1.0, 1.0))
@@ -115,11 +113,11 @@ class ShaderReader:
             anisotropy=number(shader, "specular_anisotropy", 0.0),
             anisotropy_rotation=2 * np.pi * number(shader, "specular_rotation", 0.0),
             transmission=transmission,
-            thickness=0.0 if number(shader, "thin_walled", 0.0) else thickness,
+            is_solid=number(shader, "thin_walled", 0.0) == 0,
             **_volume(tint, depth * self._meters),
         )
 
-    def _open_pbr_surface(self, shader: Any, thickness: float) -> Surface:
+    def _open_pbr_surface(self, shader: Any) -> Surface:
         """OpenPBR Surface 1.1."""
         number, value, color = self._number, self._value, self._network.numbers
         self._warn_ignored(
@@ -129,6 +127,8 @@ class ShaderReader:
         transmission = number(shader, "transmission_weight", 0.0)
         tint = color(shader, "transmission_color", (1.0, 1.0, 1.0))
         base = self._scaled(value(shader, "base_color", (0.8, 0.8, 0.8)), number(shader, "base_weight", 1.0))
+        coat = value(shader, "coat_weight", (0.0,))
+        base = self._below_coat(base, coat, value(shader, "coat_color", (1.0, 1.0, 1.0)))
         fuzz = number(shader, "fuzz_weight", 0.0)
         return Surface(
             base_color=self._transmitted(base, transmission, tint, depth),
@@ -141,13 +141,13 @@ class ShaderReader:
             ior=self._ior(number(shader, "specular_ior", 1.5)),
             specular_weight=number(shader, "specular_weight", 1.0),
             specular_tint=color(shader, "specular_color", (1.0, 1.0, 1.0)),
-            coat=value(shader, "coat_weight", (0.0,)),
+            coat=coat,
             coat_roughness=value(shader, "coat_roughness", (0.0,)),
             sheen_color=tuple(fuzz * channel for channel in color(shader, "fuzz_color", (1.0, 1.0, 1.0))),
             sheen_roughness=number(shader, "fuzz_roughness", 0.5),
             anisotropy=number(shader, "specular_roughness_anisotropy", 0.0),
             transmission=transmission,
-            thickness=0.0 if number(shader, "geometry_thin_walled", 0.0) else thickness,
+            is_solid=number(shader, "geometry_thin_walled", 0.0) == 0,
             **_volume(tint, depth * self._meters),
         )
 
@@ -169,9 +169,27 @@ class ShaderReader:
         return (1.0, 1.0, 1.0) if depth > 0 else tint
 
     def _scaled(self, value: Value, weight: float) -> Value:
+        return self._multiplied(value, (weight,) * 3)
+
+    def _multiplied(self, value: Value, color: Numbers) -> Value:
+        """A color times another one."""
         if isinstance(value, Sample):
-            return replace(value, scale=tuple(weight * scale for scale in value.scale))
-        return tuple(weight * channel for channel in value) if isinstance(value, tuple) else value
+            scale, bias = (
+                tuple(np.multiply(row, (*color, 1.0)[: len(row)]).tolist()) for row in (value.scale, value.bias)
+            )
+            return replace(value, scale=scale, bias=bias)
+        return tuple(np.multiply(value, color).tolist()) if isinstance(value, tuple) else value
+
+    def _below_coat(self, base: Value, coat: Value, tint: Value) -> Value:
+        """The base color times that of the coat, as far as it covers the base."""
+        if coat == (0.0,) or tint == (1.0, 1.0, 1.0):
+            return base
+        if isinstance(coat, tuple) and isinstance(tint, tuple) and len(tint) == 3:
+            return self._multiplied(base, tuple(1 - coat[0] * (1 - channel) for channel in tint))
+        if coat == (1.0,) and isinstance(tint, Sample) and isinstance(base, tuple):
+            return self._multiplied(tint, base)
+        self._warnings.append(unsupported(f"The color of the coat of {self._label} isn't supported; it is clear."))
+        return base
 
     def _warn_ignored(self, shader: Any, inputs: dict[str, float]) -> None:
         """One warning for inputs that are not supported and differ from the value that turns them off."""

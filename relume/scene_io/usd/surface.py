@@ -33,7 +33,7 @@ class Surface:
     Attributes:
         specular_color: reflectance at normal incidence instead of that of `ior`; None for that of `ior`.
         opacity_threshold: surfaces below it are cut; 0 for blending.
-        thickness: of a solid with this boundary, meters; 0 for a thin pane. attenuation_distance: meters.
+        is_solid: what transmits is the boundary of a solid, not a thin pane. attenuation_distance: meters.
         transparency: fraction of the light that passes without a change of color, as UsdPreviewSurface's opacity.
     """
 
@@ -57,7 +57,7 @@ class Surface:
     anisotropy: float = 0.0
     anisotropy_rotation: float = 0.0
     transmission: float = 0.0
-    thickness: float = 0.0
+    is_solid: bool = False
     attenuation_color: Numbers = (1.0, 1.0, 1.0)
     attenuation_distance: float = float("inf")
     transparency: float = 0.0
@@ -79,11 +79,12 @@ class SurfaceConverter:
         self._images, self._label, self._warnings = images, label, warnings
         self.uv_names: list[str] = []
 
-    def convert(self, surface: Surface, name: str, *, double_sided: bool) -> GltfMaterial:
+    def convert(self, surface: Surface, name: str, thickness: float, *, double_sided: bool) -> GltfMaterial:
         """Return the material in the model of glTF.
 
         Args:
-            surface: inputs of the shader. name: of the material. double_sided: whether both sides emit.
+            surface: inputs of the shader. name: of the material. thickness: of its solids, meters.
+            double_sided: whether both sides emit.
         """
         emission, emission_factor = self._channels(surface.emission, (0.0, 0.0, 0.0), "emission")
         occlusion, _ = self._channels(surface.occlusion, (1.0,), "occlusion")
@@ -99,7 +100,7 @@ class SurfaceConverter:
             alphaMode="MASK" if is_cut else "BLEND" if has_alpha else "OPAQUE",
             alphaCutoff=surface.opacity_threshold if is_cut else 0.5,
             doubleSided=double_sided,
-            extensions={f"KHR_materials_{key}": value for key, value in self._extensions(surface).items()},
+            extensions={f"KHR_materials_{key}": value for key, value in self._extensions(surface, thickness).items()},
         )
 
     def _metallic_roughness(self, surface: Surface) -> tuple[MetallicRoughness, bool]:
@@ -117,7 +118,7 @@ class SurfaceConverter:
         )
         return pbr, opacity[0] is not WHITE or opacity_factor[0] < 1
 
-    def _extensions(self, surface: Surface) -> dict[str, Any]:
+    def _extensions(self, surface: Surface, thickness: float) -> dict[str, Any]:
         coat, coat_factor = self._channels(surface.coat, (0.0,), "coat")
         coat_roughness, coat_roughness_factor = self._channels(surface.coat_roughness, (0.0,), "coat roughness")
         return {
@@ -139,7 +140,7 @@ class SurfaceConverter:
             },
             "transmission": {"transmissionFactor": _clip([surface.transmission])[0]},
             "volume": {
-                "thicknessFactor": surface.thickness,
+                "thicknessFactor": thickness if surface.is_solid else 0.0,
                 "attenuationColor": _clip(surface.attenuation_color),
                 "attenuationDistance": surface.attenuation_distance,
             },
