@@ -88,7 +88,7 @@ def import_usd(
     warnings: list[ImporterWarning] = []
     with tempfile.TemporaryDirectory() as folder:
         layers = LayerFolder(Path(folder), warnings)
-        stage = layers.open_stage(data, companions or NoFiles())
+        stage = layers.open_stage(data, NoFiles() if companions is None else companions)
         return _StageReader(stage, layers, options, warnings).scene(name, environment)
 
 
@@ -123,6 +123,7 @@ class _StageReader:
         self._colors: set[tuple[float, ...]] = set()
         self._shapes: list[_Shape] = []
         self._placed: list[tuple[Any, F64]] = []  # lights and cameras
+        self._other_uvs: dict[tuple[str, str], list[str]] = {}  # meshes by the set that they lack and the one they have
         self._skipped: Counter[str] = Counter()
         self._num_prims, self._remaining_triangles = 0, MAX_TRIANGLES
 
@@ -338,6 +339,11 @@ class _StageReader:
                 meshes.extend([] if mesh is None else [mesh])
             materials.append(material)
         reader.warn_occlusion_maps()
+        for (wanted, other), without in self._other_uvs.items():
+            count = f"{len(without):,} {'mesh' if len(without) == 1 else 'meshes'}"
+            message = f"Texture coordinates {quote(wanted)} are missing in {count}, for example {quote(without[0])}"
+            instead = f"{quote(other)} are used" if other else "textures show one color there"
+            self._warnings.append((approximated if other else unsupported)(f"{message}; {instead}."))
         return materials, meshes
 
     def _make_mesh(self, shape: _Shape, material: UsdMaterial, number: int, origin: F64, name: str) -> Mesh | None:
@@ -379,17 +385,11 @@ class _StageReader:
         candidates = {key: value for key, value in triangles.primvars.items() if value.values.shape[1] == 2}
         primvar = candidates.get(material.uv_name)
         if primvar is None:
-            if len(candidates) != 1:
-                message = (
-                    f"mesh {quote(name)} has no texture coordinates {quote(material.uv_name)}; textures show one color."
-                )
-                self._warnings.append(unsupported(message[0].upper() + message[1:]))
+            other = next(iter(candidates)) if len(candidates) == 1 else ""
+            self._other_uvs.setdefault((material.uv_name, other), []).append(name)
+            if not other:
                 return none
-            other, primvar = next(iter(candidates.items()))
-            message = (
-                f"Mesh {quote(name)} has no texture coordinates {quote(material.uv_name)}; {quote(other)} are used."
-            )
-            self._warnings.append(approximated(message))
+            primvar = candidates[other]
         uvs = np.column_stack([primvar.values[:, 0], 1 - primvar.values[:, 1]]).astype(np.float32)
         slot = replace(material.read_material.uv_slot, uv_set=0)
         return slot.apply([uvs], len(uvs)).astype(np.float64), primvar.index

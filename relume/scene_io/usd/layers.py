@@ -92,6 +92,9 @@ class LayerFolder:
     """
 
     def __init__(self, path: Path, warnings: list[ImporterWarning]) -> None:
+        from pxr import UsdUtils
+
+        self._diagnostics = UsdUtils.CoalescingDiagnosticDelegate()  # otherwise USD writes to stderr
         self._path, self._warnings = path.resolve(), warnings
         self._layers: dict[str, Any] = {}  # by private name; USD forgets the changes of a layer without a reference
         self._names: dict[Asset, str] = {}
@@ -106,9 +109,8 @@ class LayerFolder:
         Raises:
             SceneError: the root layer is damaged, or there are too many layers.
         """
-        from pxr import Tf, Usd, UsdUtils
+        from pxr import Tf, Usd
 
-        silent = UsdUtils.CoalescingDiagnosticDelegate()  # otherwise USD writes to stderr
         name = self._add(data, companions, "", 0)
         if not name:
             raise SceneError("the USD file is damaged; export it again")
@@ -116,7 +118,7 @@ class LayerFolder:
             stage = Usd.Stage.Open(self._layers[name])
         except Tf.ErrorException:
             raise SceneError("the layers of the USD file cannot be composed; export it again") from None
-        self._warn_errors([problem.commentary for problem in silent.TakeUncoalescedDiagnostics()])
+        self._warn_errors([problem.commentary for problem in self._diagnostics.TakeUncoalescedDiagnostics()])
         for layer in stage.GetUsedLayers():
             if not layer.anonymous and not Path(layer.realPath).is_relative_to(self._path):
                 raise SceneError("the USD file opens a layer outside its folder; put all layers next to it")

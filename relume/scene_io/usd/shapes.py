@@ -13,7 +13,12 @@ from relume.scene_io.usd.polygon_mesh import PolygonMesh
 
 F64 = NDArray[np.float64]
 SEGMENTS = 64  # around an axis
-_TO_AXIS = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}  # of coordinates about Z
+_TO_AXIS = {
+    "X": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
+    "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "Z": np.eye(3),
+}
+"""Rotations of Z to an axis; the width of a plane stays along X, or becomes that along Z, as its schema says."""
 
 
 def shape_mesh(prim: Any, time: Any) -> PolygonMesh | None:
@@ -44,7 +49,7 @@ def shape_mesh(prim: Any, time: Any) -> PolygonMesh | None:
     else:
         return None
     axis = prim.GetAttribute("axis").Get(time) if prim.HasAttribute("axis") else "Z"
-    points = mesh.points[:, _TO_AXIS.get(str(axis), _TO_AXIS["Z"])]
+    points = mesh.points @ _TO_AXIS.get(str(axis), _TO_AXIS["Z"]).T
     return PolygonMesh(points, mesh.lengths, mesh.vertex, mesh.face, is_smooth=True) if np.ptp(points) > 0 else None
 
 

@@ -50,7 +50,7 @@ def subdivide(mesh: PolygonMesh, creases: Creases, levels: int) -> PolygonMesh:
     """
     for _ in range(levels):
         points, creases_after = _refine(mesh.points, mesh.vertex, mesh.lengths, creases)
-        primvars = {name: _refine_primvar(primvar, mesh.lengths) for name, primvar in mesh.primvars.items()}
+        primvars = {name: _refine_primvar(primvar, mesh) for name, primvar in mesh.primvars.items()}
         lengths = np.full(len(mesh.vertex), 4, np.int64)
         mesh = replace(
             mesh, points=points.values, vertex=points.index, lengths=lengths, face=mesh.face[mesh.owner],
@@ -60,10 +60,12 @@ def subdivide(mesh: PolygonMesh, creases: Creases, levels: int) -> PolygonMesh:
     return mesh
 
 
-def _refine_primvar(primvar: Primvar, lengths: I64) -> Primvar:
+def _refine_primvar(primvar: Primvar, mesh: PolygonMesh) -> Primvar:
+    """Refine a primvar: two faces share a value only where they share the vertex, too."""
     values = np.concatenate([primvar.values, np.zeros((1, primvar.values.shape[1]))])  # of index -1
     index = np.where(primvar.index < 0, len(values) - 1, primvar.index)
-    return _refine(values, index, lengths, NO_CREASES)[0]
+    pairs, corner = np.unique(mesh.vertex * len(values) + index, return_inverse=True)
+    return _refine(values[pairs % len(values)], corner, mesh.lengths, NO_CREASES)[0]
 
 
 def _refine(values: F64, vertex: I64, lengths: I64, creases: Creases) -> tuple[Primvar, Creases]:
