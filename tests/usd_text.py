@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 
 import numpy as np
 import PIL.Image
@@ -16,12 +17,15 @@ from relume.scene_io.referenced_files import Companions
 WHITE = Environment("white", np.ones((2, 4, 3), np.float32))
 
 
-class Files(dict[str, bytes]):
-    """Companions of a layer by name; a missing one is None."""
+class Files:
+    """Companions of a layer by name."""
+
+    def __init__(self, contents: Mapping[str, bytes] | None = None) -> None:
+        self._contents = dict(contents or {})
 
     def read(self, name: str, label: str) -> bytes | None:
         """See `Companions.read`."""
-        return self.get(name)
+        return self._contents.get(name)
 
 
 def usda(body: str, metadata: str = "") -> bytes:

@@ -34,7 +34,10 @@ def of_gltf(material: dict[str, Any], glb: Glb | None = None) -> Material:
 
 
 CASES = {
-    "plain": ("", {"pbrMetallicRoughness": {"baseColorFactor": [0.18] * 3 + [1], "metallicFactor": 0, "roughnessFactor": 0.5}}),
+    "plain": (
+        "",
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.18] * 3 + [1], "metallicFactor": 0, "roughnessFactor": 0.5}},
+    ),
     "metal": (
         "color3f inputs:diffuseColor = (.9, .6, .2)\nfloat inputs:metallic = 1\nfloat inputs:roughness = .25",
         {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.6, 0.2, 1], "metallicFactor": 1, "roughnessFactor": 0.25}},

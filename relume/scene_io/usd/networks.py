@@ -144,7 +144,7 @@ class NetworkReader:
             return None
         if len(numbers) == 3 and attribute.HasColorSpace() and attribute.GetColorSpace().lower() in SRGB:
             numbers = srgb_decode(np.clip(numbers, 0, 1))
-        return tuple(numbers.tolist())
+        return tuple(float(f"{number:.7g}") for number in numbers.tolist())  # of single precision, as people wrote it
 
     def _read_node(self, node: Any, output: str, name: str, depth: int) -> Value:
         identifier = str(node.GetIdAttr().Get(self._time) or "")
