@@ -14,7 +14,8 @@ from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply import import_obj, import_ply, import_stl, is_stl
 from relume.scene_io.placement import place
 from relume.scene_io.referenced_files import Companions, Folder, NoFiles
-from relume.scene_io.usd import import_usd, is_usd
+from relume.scene_io.root_layer import is_usd
+from relume.scene_io.usd import import_usd
 from relume.scene_io.zip_scene import open_zip
 
 MAX_FILE_BYTES = 512 << 20

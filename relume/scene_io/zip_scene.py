@@ -9,6 +9,7 @@ import zipfile
 from relume.archives.bounded import LongDirectoryError, open_bounded
 from relume.core.errors import SceneError
 from relume.scene_io.referenced_files import MAX_BYTES, Archive, read_entry
+from relume.scene_io.root_layer import find_roots
 
 MAX_ENTRIES = 1_000
 MAX_DIRECTORY_BYTES = 1 << 20
@@ -56,8 +57,6 @@ def _find_scene(data: bytes, entries: list[zipfile.ZipInfo], archive: zipfile.Zi
 
 def _find_root_layer(layers: list[zipfile.ZipInfo], archive: zipfile.ZipFile) -> zipfile.ZipInfo:
     """The layer that no other layer names; of several, the only one in the uppermost folder."""
-    from relume.scene_io.usd.layers import find_roots  # which opens packages itself
-
     if len(layers) == 1:
         return layers[0]
     roots = find_roots({entry.filename: read_entry(archive, entry) for entry in layers})

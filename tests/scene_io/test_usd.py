@@ -14,7 +14,7 @@ from relume.core.errors import SceneError
 from relume.scene.model import Mesh, Scene
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.placement import area, bounds
-from relume.scene_io.usd import importer
+from relume.scene_io.usd import stage_reader
 
 pytest.importorskip("pxr.Usd")
 
@@ -146,8 +146,8 @@ def Mesh "Arrow" {
 
 
 def test_normals_are_the_files_or_flat_or_smooth() -> None:
-    leaning = 'normal3f[] normals = [(1, 0, 1), (0, 0, 2), (0, 0, 1), (0, 1, 0)] (\n interpolation = "vertex"\n)'
-    first = imported(usda(quad(properties=leaning))).meshes[0].normals
+    tilted = 'normal3f[] normals = [(1, 0, 1), (0, 0, 2), (0, 0, 1), (0, 1, 0)] (\n interpolation = "vertex"\n)'
+    first = imported(usda(quad(properties=tilted))).meshes[0].normals
     np.testing.assert_allclose(first[:2], [[np.sqrt(0.5), 0, np.sqrt(0.5)], [0, 0, 1]], atol=1e-6)
     roof = (PLANK % "").replace("(1, 0, 0)", "(1, 0, .2)").replace("(1, 1, 0)", "(1, 1, .2)")
     flat = imported(usda(roof))
@@ -407,10 +407,10 @@ def test_a_stage_without_triangles_says_why() -> None:
 
 def test_too_many_prims_or_triangles_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     body = usda(INSTANCER % ("", quad("InA"), quad("InB")))
-    monkeypatch.setattr(importer, "MAX_INSTANCES", 2)
+    monkeypatch.setattr(stage_reader, "MAX_INSTANCES", 2)
     with pytest.raises(SceneError, match="more than 2 meshes"):
         imported(body)
-    monkeypatch.setattr(importer, "MAX_PRIMS", 3)
+    monkeypatch.setattr(stage_reader, "MAX_PRIMS", 3)
     with pytest.raises(SceneError, match="more than 3 prims"):
         imported(body)
 

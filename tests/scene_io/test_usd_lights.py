@@ -131,14 +131,14 @@ def test_color_temperatures_are_those_of_usd() -> None:
 
 
 def test_mesh_lights_emit_from_their_material() -> None:
-    lamp = quad(
-        "Lamp", "float inputs:light:intensity = 6\nfloat inputs:intensity = 6", 'prepend apiSchemas = ["MeshLightAPI"]'
+    panel = quad(
+        "Panel", "float inputs:light:intensity = 6\nfloat inputs:intensity = 6", 'prepend apiSchemas = ["MeshLightAPI"]'
     )
-    scene = imported(usda(lamp + quad("Wall")))
+    scene = imported(usda(panel + quad("Wall")))
     (light,) = scene.lights
     assert light.fields["kind"] == "mesh"
     np.testing.assert_allclose(light.fields["emission"], 6)
-    shown = {scene.materials[mesh.material].name for mesh in scene.meshes if mesh.name == "Lamp"}
+    shown = {scene.materials[mesh.material].name for mesh in scene.meshes if mesh.name == "Panel"}
     assert shown == {light.fields["material"]}
 
 

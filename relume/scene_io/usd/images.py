@@ -34,7 +34,7 @@ _CACHE_BYTES = 300_000_000  # of decoded images, which other materials may use
 
 
 @dataclass(frozen=True)
-class Channel:
+class ImageChannel:
     """A channel of an image of the file; None for the sample is white."""
 
     sample: Sample | None
@@ -42,10 +42,10 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Recipe:
+class TextureRecipe:
     """A texture: its four channels, and the meaning of the first three."""
 
-    channels: tuple[Channel, Channel, Channel, Channel]
+    channels: tuple[ImageChannel, ImageChannel, ImageChannel, ImageChannel]
     meaning: Meaning
 
     @property
@@ -62,9 +62,9 @@ class UsdImages:
         self._decoder = Decoder()
         self._decoded: dict[str, U8 | F32] = {}
         self._unusable: set[str] = set()
-        self._recipes: list[Recipe] = []
+        self._recipes: list[TextureRecipe] = []
 
-    def add(self, recipe: Recipe) -> int:
+    def add(self, recipe: TextureRecipe) -> int:
         """Return the number of a texture."""
         self._recipes.append(recipe)
         return len(self._recipes) - 1
@@ -146,7 +146,7 @@ def _check_size(width: int, height: int) -> None:
         raise SceneError(f"it is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down")
 
 
-def _channel_bytes(pixels: U8 | F32, channel: Channel, meaning: Meaning, slot: int) -> Shaped[U8, "height width"]:
+def _channel_bytes(pixels: U8 | F32, channel: ImageChannel, meaning: Meaning, slot: int) -> Shaped[U8, "height width"]:
     """One channel of a texture from that of an image, whose bytes are sRGB or not."""
     sample, is_color = channel.sample, meaning == "color" and slot < 3
     assert sample is not None

@@ -7,11 +7,8 @@ image, or it is removed. A stage of these layers opens no other file.
 
 from __future__ import annotations
 
-import codecs
 import posixpath
 import re
-import tempfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,64 +17,19 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.obj_ply.material_maker import printable, read_companion
 from relume.scene_io.referenced_files import Archive, Companions
+from relume.scene_io.root_layer import FORMAT_ARGUMENTS, layer_paths, open_layer
 from relume.scene_io.usd.materialx_layers import write_materialx_layer
 from relume.scene_io.zip_scene import LAYER_SUFFIXES, open_zip
 
 MATERIALX_SUFFIX = ".mtlx"
 MAX_LAYERS = 1_000
 MAX_DEPTH = 32  # of packages and layers that name one another
-MAGIC = (b"PXR-USDC", b"#usda", b"#sdf")  # crate, and text
-FORMAT_ARGUMENTS = ":SDF_FORMAT_ARGS:"
 ERROR = re.compile(r"In <([^>]*)>: ([^@<]+)")
 INSTALL = "USD files need usd-core: pip install relume[usd]"
 
 
-def is_usd(data: bytes) -> bool:
-    """True if bytes are a layer: text or crate."""
-    return data.removeprefix(codecs.BOM_UTF8).startswith(MAGIC)
-
-
-def find_roots(layers: Mapping[str, bytes]) -> list[str]:
-    """Names of the layers that no other one names, without those that are damaged.
-
-    Args:
-        layers: contents by their paths in an archive.
-    """
-    named: set[str] = set()
-    readable: list[str] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for number, (name, data) in enumerate(layers.items()):
-            layer = _open_layer(data, Path(folder) / f"layer-{number}.usd")
-            if layer is not None:
-                readable.append(name)
-                paths = (path.split(FORMAT_ARGUMENTS)[0].partition("[")[0] for path in _paths(layer))
-                joined = (posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) for path in paths)
-                named |= {path for path in joined if path != name}
-    return [name for name in readable if name not in named]
-
-
-def _open_layer(data: bytes, path: Path) -> Any:
-    """Write a layer, and open it; None if it is damaged."""
-    from pxr import Sdf, Tf
-
-    path.write_bytes(data.removeprefix(codecs.BOM_UTF8))
-    try:
-        return Sdf.Layer.FindOrOpen(str(path)) if is_usd(data) else None
-    except Tf.ErrorException:
-        return None
-
-
-def _paths(layer: Any) -> list[str]:
-    """All names of files in a layer."""
-    from pxr import UsdUtils
-
-    paths: dict[str, str] = {}
-    UsdUtils.ModifyAssetPaths(layer, lambda path: paths.setdefault(path, path))
-    return [*paths]
-
-
 @dataclass(frozen=True)
-class Asset:
+class LayerAsset:
     """A file that a layer names: relative to the folder of the scene, or to that of a package's first layer."""
 
     companions: Companions
@@ -97,9 +49,9 @@ class LayerFolder:
         self._diagnostics = UsdUtils.CoalescingDiagnosticDelegate()  # otherwise USD writes to stderr
         self._path, self._warnings = path.resolve(), warnings
         self._layers: dict[str, Any] = {}  # by private name; USD forgets the changes of a layer without a reference
-        self._names: dict[Asset, str] = {}
-        self._packages: dict[Asset, tuple[bytes, Archive] | None] = {}
-        self.assets: dict[str, Asset] = {}
+        self._names: dict[LayerAsset, str] = {}
+        self._packages: dict[LayerAsset, tuple[bytes, Archive] | None] = {}
+        self.assets: dict[str, LayerAsset] = {}
 
     def open_stage(self, data: bytes, companions: Companions) -> Any:
         """Open a root layer, and all layers that it needs.
@@ -136,7 +88,7 @@ class LayerFolder:
     def _add(self, data: bytes, companions: Companions, folder: str, depth: int) -> str:
         """Write a layer and those that it names; return its private name, empty if it is damaged."""
         name = self._next_name(depth)
-        layer = _open_layer(data, self._path / name)
+        layer = open_layer(data, self._path / name)
         if layer is None:
             return ""
         self._keep(name, layer, companions, folder, depth)
@@ -153,19 +105,19 @@ class LayerFolder:
         from pxr import UsdUtils
 
         self._layers[name] = layer
-        paths = {path: self._private_path(path, companions, folder, depth) for path in _paths(layer)}
+        paths = {path: self._private_path(path, companions, folder, depth) for path in layer_paths(layer)}
         UsdUtils.ModifyAssetPaths(layer, lambda path: paths.get(path, ""))
         _remove_clips(layer, self._warnings)
 
     def _private_path(self, path: str, companions: Companions, folder: str, depth: int) -> str:
         """The private path of a file that a layer names; empty if it is missing."""
         outer, _, inner = path.split(FORMAT_ARGUMENTS)[0].removesuffix("]").partition("[")
-        asset = Asset(companions, posixpath.normpath(posixpath.join(folder, outer.replace("\\", "/"))))
+        asset = LayerAsset(companions, posixpath.normpath(posixpath.join(folder, outer.replace("\\", "/"))))
         if inner:
             package = self._open_package(asset)
             if package is None:
                 return ""
-            asset = Asset(package[1], posixpath.relpath(inner, package[1].folder or "."))
+            asset = LayerAsset(package[1], posixpath.relpath(inner, package[1].folder or "."))
         if not asset.name.lower().endswith((*LAYER_SUFFIXES, MATERIALX_SUFFIX)):
             key = f"asset-{len(self.assets)}"
             self.assets[key] = asset
@@ -175,7 +127,7 @@ class LayerFolder:
             self._names[asset] = self._add_named(asset, depth + 1)
         return self._names[asset]
 
-    def _add_named(self, asset: Asset, depth: int) -> str:
+    def _add_named(self, asset: LayerAsset, depth: int) -> str:
         if asset.name.lower().endswith(".usdz"):
             package = self._open_package(asset)
             return "" if package is None else self._add(*package, "", depth)
@@ -190,7 +142,7 @@ class LayerFolder:
             self._warnings.append(unsupported(f"Skipped the layer “{printable(asset.name)}”: it is damaged."))
         return name
 
-    def _add_materialx(self, data: bytes, asset: Asset, folder: str, depth: int) -> str:
+    def _add_materialx(self, data: bytes, asset: LayerAsset, folder: str, depth: int) -> str:
         """Add a MaterialX document as a layer; return its private name, empty if it cannot be used."""
         name = self._next_name(depth)
         try:
@@ -201,7 +153,7 @@ class LayerFolder:
         self._keep(name, layer, asset.companions, folder, depth)
         return name
 
-    def _open_package(self, asset: Asset) -> tuple[bytes, Archive] | None:
+    def _open_package(self, asset: LayerAsset) -> tuple[bytes, Archive] | None:
         """The first layer of a .usdz file, and its other files; None with a warning if it cannot be used."""
         if asset not in self._packages:
             self._packages[asset] = None
@@ -212,7 +164,7 @@ class LayerFolder:
                 self._warnings.append(unsupported(f"Skipped “{printable(asset.name)}”: {error}."))
         return self._packages[asset]
 
-    def read(self, asset: Asset, kind: str) -> bytes | None:
+    def read(self, asset: LayerAsset, kind: str) -> bytes | None:
         """Read a file; None with a warning if it is missing. kind: "image" or "layer"."""
         label = "a texture" if kind == "image" else "a layer"
         return read_companion(asset.companions, "", asset.name, label, self._warnings, kind)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.validate import MAX_TRIANGLES
-from relume.scene_io.usd.polygon_mesh import NORMALS, PolygonMesh, Triangles, make_triangles
+from relume.scene_io.usd.polygon_mesh import NORMALS, PolygonMesh, PrimTriangles, make_triangles
 from relume.scene_io.usd.primvars import as_rows, read_primvars
 from relume.scene_io.usd.subdivision import MAX_LEVELS, Creases, subdivide
 
@@ -26,7 +26,7 @@ class MeshReader:
         self._num_refined = 0
         self._remaining_quads = MAX_TRIANGLES // 8  # of all subdivided meshes
 
-    def read(self, prim: Any, label: str) -> Triangles | None:
+    def read(self, prim: Any, label: str) -> PrimTriangles | None:
         """Read a mesh; None with a warning if it has no faces.
 
         Args:

@@ -60,7 +60,11 @@ Value = Numbers | str | Sample | PrimvarReference | None
 
 
 def transform_2d(scale: Numbers, degrees: float, translation: Numbers) -> UvTransform:
-    """UsdTransform2d, st′ = R S st + t with t upward, for texture coordinates with v from the top."""
+    """UsdTransform2d, st′ = R S st + t with t upward, for texture coordinates with v from the top.
+
+    Args:
+        scale: S. degrees: of R, counterclockwise. translation: t.
+    """
     angle = np.radians(degrees)
     (sx, sy), (tx, ty) = scale, translation
     offset = (float(tx - np.sin(angle) * sy), float(1 - np.cos(angle) * sy - ty))
@@ -114,7 +118,11 @@ class NetworkReader:
         return None if sources else self._constant(usd_input.GetAttr())
 
     def numbers(self, shader: Any, name: str, default: Numbers, depth: int = 0) -> Numbers:
-        """Read an input that must be constant."""
+        """Read an input that must be constant.
+
+        Args:
+            shader, name, depth: as in `read`. default: value without a constant.
+        """
         value = self.read(shader, name, depth)
         if isinstance(value, tuple) and len(value) == len(default):
             return value
@@ -123,7 +131,11 @@ class NetworkReader:
         return default
 
     def text(self, shader: Any, name: str, default: str = "", depth: int = 0) -> str:
-        """Read an input with a name or path."""
+        """Read an input with a name or path.
+
+        Args:
+            shader, name, depth: as in `read`. default: value without one.
+        """
         value = self.read(shader, name, depth)
         return value if isinstance(value, str) and value else default
 
@@ -143,7 +155,7 @@ class NetworkReader:
             self._warn(attribute.GetBaseName(), "is not a finite number")
             return None
         if len(numbers) == 3 and attribute.HasColorSpace() and attribute.GetColorSpace().lower() in SRGB:
-            numbers = srgb_decode(np.clip(numbers, 0, 1))
+            numbers = srgb_decode(np.clip(numbers, 0, 1).astype(np.float32)).astype(np.float64)
         return tuple(float(f"{number:.7g}") for number in numbers.tolist())  # of single precision, as people wrote it
 
     def _read_node(self, node: Any, output: str, name: str, depth: int) -> Value:

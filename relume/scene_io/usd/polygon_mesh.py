@@ -51,8 +51,8 @@ class PolygonMesh:
         """Return a copy with some of the faces."""
         corners = np.repeat(is_selected, self.lengths)
         primvars = {name: replace(primvar, index=primvar.index[corners]) for name, primvar in self.primvars.items()}
-        rows = {"lengths": self.lengths[is_selected], "face": self.face[is_selected]}
-        return replace(self, **rows, vertex=self.vertex[corners], primvars=primvars)
+        lengths, face = self.lengths[is_selected], self.face[is_selected]
+        return replace(self, lengths=lengths, face=face, vertex=self.vertex[corners], primvars=primvars)
 
     def flip(self) -> PolygonMesh:
         """Return a copy whose faces are seen from their other side."""
@@ -63,7 +63,7 @@ class PolygonMesh:
 
 
 @dataclass(frozen=True)
-class Triangles:
+class PrimTriangles:
     """Triangles of a prim, before its transform.
 
     Attributes:
@@ -75,13 +75,13 @@ class Triangles:
     face: Shaped[I64, " triangles"]
     primvars: Mapping[str, Primvar]
 
-    def select(self, rows: Shaped[NDArray[np.bool_], " triangles"]) -> Triangles:
+    def select(self, rows: Shaped[NDArray[np.bool_], " triangles"]) -> PrimTriangles:
         """Return a copy with some of the triangles."""
         primvars = {name: replace(primvar, index=primvar.index[rows]) for name, primvar in self.primvars.items()}
         return replace(self, vertex=self.vertex[rows], face=self.face[rows], primvars=primvars)
 
 
-def make_triangles(mesh: PolygonMesh, warnings: list[ImporterWarning]) -> Triangles:
+def make_triangles(mesh: PolygonMesh, warnings: list[ImporterWarning]) -> PrimTriangles:
     """Cut polygons into triangles.
 
     Args:
@@ -99,4 +99,4 @@ def make_triangles(mesh: PolygonMesh, warnings: list[ImporterWarning]) -> Triang
         a, b, c = (mesh.points[vertex[:, k]] for k in range(3))
         facet = np.repeat(np.arange(len(vertex))[:, None], 3, axis=1)
         primvars[NORMALS] = Primvar(np.cross(b - a, c - a), facet)
-    return Triangles(mesh.points, vertex, mesh.face[cut.polygon], primvars)
+    return PrimTriangles(mesh.points, vertex, mesh.face[cut.polygon], primvars)

@@ -51,7 +51,11 @@ def read_primvars(
 
 
 def as_rows(value: Any, width: int) -> Shaped[F64, "values width"] | None:
-    """An attribute's value as rows of numbers; None if it has another type or width."""
+    """Convert an attribute's value to rows of numbers; None if it has another type or width.
+
+    Args:
+        value: of an attribute. width: numbers in a row.
+    """
     if value is None or isinstance(value, str):
         return None
     try:
@@ -69,6 +73,9 @@ def bind(values: F64, interpolation: str, indices: Any, mesh: PolygonMesh) -> Pr
     """Find the value of each corner; -1 where there is none.
 
     A constant with several values is as many programs write it: for each vertex, corner or face, by its length.
+
+    Args:
+        values: of the primvar. interpolation: as USD names it. indices: into the values, or None. mesh: the polygons.
     """
     rows = values if indices is None else np.asarray(indices, np.int64)
     by_corner = {
@@ -89,7 +96,7 @@ def bind(values: F64, interpolation: str, indices: Any, mesh: PolygonMesh) -> Pr
 
 def _check(primvar: Primvar, name: str, label: str, warnings: list[ImporterWarning]) -> Primvar:
     """Leave out values that are not numbers, with a warning about all corners without a value."""
-    is_number = (np.abs(primvar.values) <= MAX_COORDINATE).all(axis=1)
+    is_number = np.asarray((np.abs(primvar.values) <= MAX_COORDINATE).all(axis=1))
     index = np.where(is_number[primvar.index], primvar.index, -1)
     num_missing = int((index < 0).sum())
     if num_missing:

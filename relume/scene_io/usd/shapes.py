@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.scene_io.usd.polygon_mesh import PolygonMesh
 
 F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
 SEGMENTS = 64  # around an axis
 _TO_AXIS = {
     "X": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
@@ -61,7 +62,7 @@ def _cube(size: float) -> PolygonMesh:
 
 def _plane(width: float, length: float) -> PolygonMesh:
     """A rectangle whose normal is +Z."""
-    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [width / 2, length / 2, 0]
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * np.array([width / 2, length / 2, 0])
     return PolygonMesh(corners, np.array([4]), np.arange(4), np.arange(1))
 
 
@@ -75,12 +76,14 @@ def _revolve(profile: Shaped[F64, "points 2"]) -> PolygonMesh:
     """The surface of a profile (radius, height), from bottom to top, that rotates about Z; poles are one point."""
     angle = np.arange(SEGMENTS) * 2 * np.pi / SEGMENTS
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    points, rows = [], []
+    points, rows = list[F64](), list[I64]()
+    num_points = 0
     for radius, height in profile:
         count = SEGMENTS if radius > 0 else 1
-        rows.append(sum(map(len, points)) + np.arange(SEGMENTS) % count)
+        rows.append(num_points + np.arange(SEGMENTS) % count)
+        num_points += count
         points.append(np.column_stack([radius * circle[:count], np.full(count, height)]))
-    faces, lengths = [], []
+    faces, lengths = list[I64](), list[I64]()
     for below, above in pairwise(rows):
         quads = np.stack([below, np.roll(below, -1), np.roll(above, -1), above], axis=1)
         is_corner = np.ones(4, np.bool_)
@@ -88,7 +91,7 @@ def _revolve(profile: Shaped[F64, "points 2"]) -> PolygonMesh:
         if is_corner.sum() >= 3:
             faces.append(quads[:, is_corner].reshape(-1))
             lengths.append(np.full(SEGMENTS, is_corner.sum()))
-    count = sum(map(len, lengths))
+    count = sum(len(block) for block in lengths)
     empty = [np.zeros(0, np.int64)]
     vertex, counts = (np.concatenate([*empty, *blocks]).astype(np.int64) for blocks in (faces, lengths))
     return PolygonMesh(np.concatenate(points), counts, vertex, np.arange(count))

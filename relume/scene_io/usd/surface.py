@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.document import GltfMaterial, MetallicRoughness, TextureInfo
 from relume.scene_io.gltf.uvs import UvTransform
-from relume.scene_io.usd.images import Channel, Meaning, Recipe, UsdImages
+from relume.scene_io.usd.images import ImageChannel, Meaning, TextureRecipe, UsdImages
 from relume.scene_io.usd.networks import Numbers, PrimvarReference, Sample, Value
 from relume.scene_io.usd.polygon_mesh import COLOR
 
 F64 = NDArray[np.float64]
-WHITE = Channel(None)
+WHITE = ImageChannel(None)
 MAX_UV_SETS = 64
 MAX_EMISSION = 1e6
 RGB = (0, 1, 2)
@@ -165,10 +165,10 @@ class SurfaceConverter:
             or self._images.load(value.asset, f"the normal texture of {self._label}") is None
         ):
             return None
-        x, y, z = (Channel(value, number) for number in RGB)
+        x, y, z = (ImageChannel(value, number) for number in RGB)
         return self._texture((x, y, z, WHITE), "normal")
 
-    def _channels(self, value: Value, default: Numbers, name: str) -> tuple[tuple[Channel, ...], F64]:
+    def _channels(self, value: Value, default: Numbers, name: str) -> tuple[tuple[ImageChannel, ...], F64]:
         """Channels of an image, white without one, and the factor of each."""
         white = (WHITE,) * len(default)
         if isinstance(value, PrimvarReference):
@@ -186,10 +186,10 @@ class SurfaceConverter:
             return white, np.array(default)
         return white, np.array(value[:3] if len(default) == 3 and len(value) >= 3 else value[:1] * len(default))
 
-    def _texture(self, channels: tuple[Channel, ...], meaning: Meaning) -> TextureInfo | None:
+    def _texture(self, channels: tuple[ImageChannel, ...], meaning: Meaning) -> TextureInfo | None:
         """A texture; None if it is white. The first image decides on the texture coordinates."""
         red, green, blue, alpha = channels
-        recipe = Recipe((red, green, blue, alpha), meaning)
+        recipe = TextureRecipe((red, green, blue, alpha), meaning)
         if not recipe.samples:
             return None
         first, *others = recipe.samples
@@ -208,14 +208,14 @@ class SurfaceConverter:
         )
 
 
-def _split_factor(sample: Sample, width: int) -> tuple[tuple[Channel, ...], F64]:
+def _split_factor(sample: Sample, width: int) -> tuple[tuple[ImageChannel, ...], F64]:
     """Channels of a sample for one number or a color; a scale in [0, 1] without bias is the factor."""
     numbers = sample.channels[:1] * width if len(sample.channels) < width else sample.channels[:width]
     scale, bias = (np.array([row[number] for number in numbers]) for row in (sample.scale, sample.bias))
     if bias.any() or (scale < 0).any() or (scale > 1).any():
-        return tuple(Channel(sample, number) for number in numbers), np.ones(width)
+        return tuple(ImageChannel(sample, number) for number in numbers), np.ones(width)
     plain = replace(sample, scale=(1.0,) * 4, bias=(0.0,) * 4)
-    return tuple(Channel(plain, number) for number in numbers), scale
+    return tuple(ImageChannel(plain, number) for number in numbers), scale
 
 
 def _clip(values: Any) -> list[float]:

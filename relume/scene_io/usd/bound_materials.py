@@ -17,7 +17,7 @@ from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_u
 from relume.scene_io.gltf.materials import MaterialReader, ReadMaterial, VertexColors
 from relume.scene_io.usd.images import UsdImages
 from relume.scene_io.usd.networks import PrimvarReference
-from relume.scene_io.usd.polygon_mesh import COLOR, OPACITY, Primvar, Triangles
+from relume.scene_io.usd.polygon_mesh import COLOR, OPACITY, PrimTriangles, Primvar
 from relume.scene_io.usd.shaders import ShaderReader
 from relume.scene_io.usd.surface import Surface, SurfaceConverter
 
@@ -28,7 +28,7 @@ UNBOUND = Surface(base_color=PrimvarReference(COLOR))
 
 
 class MaterialKey(NamedTuple):
-    """What prims of one material share.
+    """Identity of a material, common to its prims.
 
     Attributes:
         path: of the material; empty for prims without one.
@@ -78,7 +78,7 @@ class UsdMaterialReader:
         return name, surface
 
     def read(
-        self, name: str, surface: Surface, shapes: Sequence[Triangles], thickness: float, *, double_sided: bool
+        self, name: str, surface: Surface, shapes: Sequence[PrimTriangles], thickness: float, *, double_sided: bool
     ) -> UsdMaterial:
         """Make a material.
 
@@ -105,7 +105,7 @@ class UsdMaterialReader:
         return UsdMaterial(read_material, uv_name, color_uvs)
 
     def _colors(
-        self, shapes: Sequence[Triangles], label: str, *, has_textures: bool
+        self, shapes: Sequence[PrimTriangles], label: str, *, has_textures: bool
     ) -> tuple[VertexColors, dict[int, F32]]:
         """Colors of the prims: one factor, or an image with texture coordinates for each prim."""
         blocks = [display_colors(shape) for shape in shapes]
@@ -147,7 +147,7 @@ def bound_material(prim: Any, warnings: list[ImporterWarning]) -> str:
     return ""
 
 
-def display_colors(shape: Triangles) -> Shaped[F32, "triangles 3 4"]:
+def display_colors(shape: PrimTriangles) -> Shaped[F32, "triangles 3 4"]:
     """Color and opacity of corners, gray without any."""
     colors = np.empty((len(shape.vertex), 3, 4), np.float32)
     for name, slots, default in ((COLOR, slice(0, 3), GRAY[:3]), (OPACITY, slice(3, 4), GRAY[3:])):

@@ -31,15 +31,21 @@ from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply.weld import Corners, make_mesh
 from relume.scene_io.placement import TO_Y_UP, choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
+from relume.scene_io.usd.bound_materials import (
+    MaterialKey,
+    UsdMaterial,
+    UsdMaterialReader,
+    bound_material,
+    display_colors,
+)
 from relume.scene_io.usd.cameras import read_camera
 from relume.scene_io.usd.images import UsdImages
 from relume.scene_io.usd.instances import instance_transforms
 from relume.scene_io.usd.layers import INSTALL, LayerFolder
 from relume.scene_io.usd.lights import KINDS, UsdLightReader, radiance
-from relume.scene_io.usd.materials import MaterialKey, UsdMaterial, UsdMaterialReader, bound_material, display_colors
 from relume.scene_io.usd.meshes import MeshReader
 from relume.scene_io.usd.networks import Numbers
-from relume.scene_io.usd.polygon_mesh import NORMALS, Primvar, Triangles, make_triangles
+from relume.scene_io.usd.polygon_mesh import NORMALS, PrimTriangles, Primvar, make_triangles
 from relume.scene_io.usd.primvars import read_primvars
 from relume.scene_io.usd.shapes import shape_mesh
 from relume.scene_io.usd.skinning import bake_skinning
@@ -97,7 +103,7 @@ class _Shape:
     """Triangles of a prim, or of a subset of it, at one place."""
 
     name: str
-    triangles: Triangles
+    triangles: PrimTriangles
     to_world: F64
     key: MaterialKey
     double_sided: bool
@@ -118,8 +124,8 @@ class _StageReader:
         self._transforms = UsdGeom.XformCache(self._time)
         self._images = UsdImages(layers, warnings)
         self._mesh_reader = MeshReader(self._time, warnings)
-        self._triangles: dict[str, Triangles | None] = {}
-        self._parts: dict[str, list[tuple[str, Triangles, MaterialKey]]] = {}
+        self._triangles: dict[str, PrimTriangles | None] = {}
+        self._parts: dict[str, list[tuple[str, PrimTriangles, MaterialKey]]] = {}
         self._colors: set[tuple[float, ...]] = set()
         self._shapes: list[_Shape] = []
         self._placed: list[tuple[Any, F64]] = []  # lights and cameras
@@ -246,7 +252,7 @@ class _StageReader:
             double_sided = bool(prim.GetAttribute("doubleSided").Get(self._time))
             self._shapes.append(_Shape(name, triangles, to_world, key, double_sided))
 
-    def _read_parts(self, prim: Any) -> list[tuple[str, Triangles, MaterialKey]]:
+    def _read_parts(self, prim: Any) -> list[tuple[str, PrimTriangles, MaterialKey]]:
         """Triangles of a prim for each of its materials, cached for its instances."""
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         path = str(source.GetPath())
@@ -260,7 +266,7 @@ class _StageReader:
             self._parts[key] = list(self._split(prim, triangles, key[1]))
         return self._parts[key]
 
-    def _read_triangles(self, prim: Any) -> Triangles | None:
+    def _read_triangles(self, prim: Any) -> PrimTriangles | None:
         from pxr import UsdGeom
 
         label = f"mesh {quote(prim.GetName())}"
@@ -277,7 +283,9 @@ class _StageReader:
             triangles = make_triangles(mesh, self._warnings)
         return triangles if triangles is not None and len(triangles.vertex) else None
 
-    def _split(self, prim: Any, triangles: Triangles, key: MaterialKey) -> Iterator[tuple[str, Triangles, MaterialKey]]:
+    def _split(
+        self, prim: Any, triangles: PrimTriangles, key: MaterialKey
+    ) -> Iterator[tuple[str, PrimTriangles, MaterialKey]]:
         """Triangles of each subset with a material, and those of none."""
         from pxr import UsdShade
 
@@ -294,7 +302,7 @@ class _StageReader:
         elif rest.any():
             yield prim.GetName(), triangles.select(rest), key
 
-    def _key(self, prim: Any, triangles: Triangles) -> MaterialKey:
+    def _key(self, prim: Any, triangles: PrimTriangles) -> MaterialKey:
         """The material of a prim; prims without one share it with those of the same color."""
         emission = None
         if "MeshLightAPI" in prim.GetAppliedSchemas():
@@ -373,7 +381,7 @@ class _StageReader:
         return replace(mesh, tangents=rotate_tangents(tangents, mesh.normals, rotation))
 
     def _texture_coordinates(
-        self, triangles: Triangles, material: UsdMaterial, name: str
+        self, triangles: PrimTriangles, material: UsdMaterial, name: str
     ) -> tuple[F64, NDArray[np.int64]]:
         """Texture coordinates, v from the top, and the index of each corner; −1 without any."""
         if id(triangles) in material.color_uvs:
