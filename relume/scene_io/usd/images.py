@@ -163,8 +163,11 @@ def _channel_bytes(pixels: U8 | F32, channel: ImageChannel, meaning: Meaning, sl
 
     if pixels.dtype != np.uint8:  # linear, without alpha
         has_channel = channel.number < pixels.shape[2]
-        return encode(pixels[..., channel.number]) if has_channel else np.full(pixels.shape[:2], 255, np.uint8)
-    levels = np.arange(256, dtype=np.float32) / 255
+        values = (
+            pixels[..., channel.number].astype(np.float32) if has_channel else np.ones(pixels.shape[:2], np.float32)
+        )
+        return encode(values)
+    levels: F32 = (np.arange(256) / 255).astype(np.float32)
     table = encode(srgb_decode(levels) if is_srgb and channel.number < 3 else levels)
     return np.asarray(table[pixels[..., channel.number]])
 

@@ -40,7 +40,7 @@ def radiance(prim: Any, time: Any) -> Shaped[F64, " 3"]:
         color = color * np.asarray(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
     exposure = float(np.clip(light.GetExposureAttr().Get(time), -100, 100))
     emitted = color * light.GetIntensityAttr().Get(time) * 2**exposure
-    return np.nan_to_num(np.clip(emitted, 0, MAX_INTENSITY))
+    return np.asarray(np.nan_to_num(np.clip(emitted, 0, MAX_INTENSITY)), np.float64)
 
 
 class UsdLightReader:

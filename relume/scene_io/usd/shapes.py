@@ -55,7 +55,7 @@ def shape_mesh(prim: Any, time: Any) -> PolygonMesh | None:
 
 
 def _cube(size: float) -> PolygonMesh:
-    points = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * size  # z changes fastest
+    points = (np.indices((2, 2, 2)).reshape(3, -1).T.astype(np.float64) - 0.5) * size  # z changes fastest
     faces = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
     return PolygonMesh(points, np.full(6, 4), faces.reshape(-1), np.arange(6))
 

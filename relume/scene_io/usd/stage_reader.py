@@ -125,7 +125,7 @@ class _StageReader:
         self._images = UsdImages(layers, warnings)
         self._mesh_reader = MeshReader(self._time, warnings)
         self._triangles: dict[str, PrimTriangles | None] = {}
-        self._parts: dict[str, list[tuple[str, PrimTriangles, MaterialKey]]] = {}
+        self._parts: dict[tuple[str, MaterialKey], list[tuple[str, PrimTriangles, MaterialKey]]] = {}
         self._colors: set[tuple[float, ...]] = set()
         self._shapes: list[_Shape] = []
         self._placed: list[tuple[Any, F64]] = []  # lights and cameras
