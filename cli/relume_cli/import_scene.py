@@ -23,7 +23,7 @@ def import_scene(
     file: Annotated[
         Path | None,
         typer.Argument(
-            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply, .stl or .zip, with the files it references."
+            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply, .stl, .usd or .zip, with the files it references."
         ),
     ] = None,
     environment: Annotated[

@@ -11,6 +11,7 @@ from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 
 MAX_WARNINGS = 200
+MAX_REFUSAL = 380  # characters
 
 
 def finalize(
@@ -49,3 +50,12 @@ def sort_warnings(warnings: Sequence[ImporterWarning]) -> list[ImporterWarning]:
         more = ImporterWarning(f"… and {num_omitted:,} more.", sorted_warnings[MAX_WARNINGS - 1].severity)
         return [*sorted_warnings[:MAX_WARNINGS], more]
     return sorted_warnings
+
+
+def no_triangles(warnings: Sequence[ImporterWarning]) -> str:
+    """Why there is nothing to show, with the faults of the file."""
+    faults = "; ".join(dict.fromkeys(str(warning) for warning in warnings if warning.severity == "unsupported"))
+    message = "the scene has no triangles with an area; export at least one mesh made of triangles"
+    message += f" ({faults})" if faults else ""
+    message = "".join(character if character.isprintable() else " " for character in message)
+    return message if len(message) <= MAX_REFUSAL else f"{message[: MAX_REFUSAL - 1]}…"

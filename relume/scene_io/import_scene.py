@@ -14,9 +14,12 @@ from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply import import_obj, import_ply, import_stl, is_stl
 from relume.scene_io.placement import place
 from relume.scene_io.referenced_files import Companions, Folder, NoFiles
+from relume.scene_io.root_layer import is_usd
+from relume.scene_io.usd import import_usd
 from relume.scene_io.zip_scene import open_zip
 
 MAX_FILE_BYTES = 512 << 20
+_MAX_PACKAGES = 2  # a .zip file may contain a .usdz file, which is one, too
 OBJ_LINE = re.compile(rb"(?:^|\r|\xef\xbb\xbf)[ \t]*(v|vn|vt|f|o|g|usemtl|mtllib)[ \t]", re.MULTILINE)
 
 
@@ -27,7 +30,7 @@ def import_scene(
     companions: Companions | None = None,
     options: ImportOptions | None = None,
 ) -> Scene:
-    """Import .glb, .gltf, .obj, .ply, .stl, or a .zip with one of them and the files that it needs.
+    """Import .glb, .gltf, .obj, .ply, .stl, .usd, or a .zip with one of them and the files that it needs.
 
     Args:
         source: a path, whose folder may have further files; or the bytes of a file.
@@ -44,8 +47,9 @@ def import_scene(
         raise SceneError("the scene file is empty: 0 bytes; export or download it again")
     if companions is None:
         companions = NoFiles() if isinstance(source, bytes) else Folder(Path(source).parent)
-    if data.startswith(b"PK"):
-        data, companions = open_zip(data)
+    for _ in range(_MAX_PACKAGES):
+        if data.startswith(b"PK"):
+            data, companions = open_zip(data)
     options = options or ImportOptions()
     return place(_read(data, name, environment, companions, options), options)
 
@@ -53,8 +57,10 @@ def import_scene(
 def _read(
     data: bytes, name: str, environment: Environment | None, companions: Companions, options: ImportOptions
 ) -> Scene:
-    """The scene in the axes and unit of the file."""
+    """The scene in meters with +Y up if the file says how and the options leave it to the file, otherwise as it is."""
     recenter = options.recenter
+    if is_usd(data):
+        return import_usd(data, name, environment, companions, options)
     if data.removeprefix(codecs.BOM_UTF8).startswith(b"ply"):
         return import_ply(data, name, environment, companions, recenter)
     if data.startswith(b"glTF") or data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
@@ -63,7 +69,7 @@ def _read(
         return import_obj(data, name, environment, companions, recenter)
     if is_stl(data):
         return import_stl(data, name, environment, recenter)
-    raise SceneError("the scene file is not .glb, .gltf, .obj, .ply, .stl or .zip; export it as .glb")
+    raise SceneError("the scene file is not .glb, .gltf, .obj, .ply, .stl, .usd or .zip; export it as .glb")
 
 
 def read_file(source: str | Path | bytes) -> bytes:

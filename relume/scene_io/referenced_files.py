@@ -101,7 +101,11 @@ def fold(name: str) -> str:
 
 
 class NamedFiles(Generic[Entry]):
-    """Files by name, including folders, independent of paths on disk."""
+    """Files by name, including folders, independent of paths on disk.
+
+    Attributes:
+        folder: folder of the scene file, within those names.
+    """
 
     def __init__(self, entries: Mapping[str, Entry], folder: str, read: Callable[[Entry], bytes]) -> None:
         """
@@ -109,12 +113,12 @@ class NamedFiles(Generic[Entry]):
             entries: entries by name, passed to `read`. folder: folder of the scene file, within those names.
         """
         self._entries = {fold(posixpath.normpath(name.replace("\\", "/"))): entry for name, entry in entries.items()}
-        self._folder, self._read = folder, read
+        self.folder, self._read = folder, read
 
     def read(self, name: str, label: str) -> bytes | None:
         """Read a file as `Companions.read` does; names are case-insensitive."""
         for spelling in dict.fromkeys((unquote(name), name)):
-            plain = posixpath.normpath(posixpath.join(self._folder, spelling.replace("\\", "/")))
+            plain = posixpath.normpath(posixpath.join(self.folder, spelling.replace("\\", "/")))
             entry = self._entries.get(fold(relative_path(plain, label)))
             if entry is not None:
                 return self._read(entry)

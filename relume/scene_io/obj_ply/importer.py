@@ -15,7 +15,7 @@ from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.collect_lights import LightCollector
-from relume.scene.finalize import finalize
+from relume.scene.finalize import finalize, no_triangles
 from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, TextureEncoding
 from relume.scene.unique_names import unique_name
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
@@ -37,7 +37,6 @@ from relume.scene_io.referenced_files import Companions, NoFiles
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 MAX_LIBRARIES = 100
-MAX_REFUSAL = 380  # characters
 SCAN_ROUGHNESS = 0.5
 
 
@@ -88,7 +87,7 @@ class _Builder:
     def scene(self, name: str, environment: Environment | None, origin: F64) -> Scene:
         """The finished scene. Raises SceneError with all faults if there is nothing to show."""
         if not self.meshes:
-            raise SceneError(_refusal(self.warnings))
+            raise SceneError(no_triangles(self.warnings))
         self.maker.warn_gloss()
         collector = LightCollector(self.warnings)
         materials = collector.emissive_light(self.materials, self.emissions, self.meshes)
@@ -97,15 +96,6 @@ class _Builder:
         offset = (float(origin[0]), float(origin[1]), float(origin[2]))
         light = environment or studio()
         return finalize(name, self.meshes, materials, cameras, light, self.warnings, lights=lights, offset=offset)
-
-
-def _refusal(warnings: Sequence[ImporterWarning]) -> str:
-    """Why there is nothing to show, with the faults of the file."""
-    faults = "; ".join(dict.fromkeys(str(warning) for warning in warnings if warning.severity == "unsupported"))
-    message = "the scene has no triangles with an area; export at least one mesh made of triangles"
-    message += f" ({faults})" if faults else ""
-    message = "".join(character if character.isprintable() else " " for character in message)
-    return message if len(message) <= MAX_REFUSAL else f"{message[: MAX_REFUSAL - 1]}…"
 
 
 def import_obj(

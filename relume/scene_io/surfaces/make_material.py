@@ -57,7 +57,7 @@ class _PackedTextures:
         self._textures.append(channels)
         return len(self._textures) - 1
 
-    def is_usable(self, index: int, label: str) -> bool:  # noqa: ARG002
+    def is_usable(self, index: int, label: str) -> bool:
         """True: `SurfaceInputs` left out what cannot be read."""
         return True
 

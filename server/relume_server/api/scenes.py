@@ -48,7 +48,7 @@ _MATERIAL_DEFAULTS = {
 DEFAULT_ASPECT = 4 / 3  # of cameras with a vertical field of view only
 SceneFile = Annotated[
     UploadFile,
-    File(description="a .glb, .gltf, .obj, .ply or .stl file, or a .zip with one and the files that it references"),
+    File(description="a .glb, .gltf, .obj, .ply, .stl or .usd file, or a .zip with one and the files it references"),
 ]
 EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
 SceneName = Annotated[str, Form(max_length=200)]

@@ -1,0 +1,254 @@
+"""UsdLux lights as local lights and as an environment.
+
+Radiance is L = color · blackbody · intensity · 2^exposure, over the area of the light if it is normalized. Kinds that
+relume does not have become the nearest one with the same power in its main direction.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.assets.environments.environment import Environment
+from relume.assets.environments.equirect import lookup, texel_directions
+from relume.assets.environments.read_environment import read_environment
+from relume.core.errors import SceneError
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
+from relume.scene.collect_lights import LightCollector
+from relume.scene.validate import MAX_EMISSION, MAX_METERS
+from relume.scene_io.usd.images import UsdImages
+
+F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
+MAX_INTENSITY = 1e30
+UNIFORM_SIZE = (2, 4)  # texels of a dome without an image
+DOMES = ("DomeLight", "DomeLight_1")
+KINDS = ("DistantLight", "SphereLight", "DiskLight", "RectLight", "CylinderLight", *DOMES)
+
+
+def radiance(prim: Any, time: Any) -> Shaped[F64, " 3"]:
+    """L of a light before normalization."""
+    from pxr import UsdLux
+
+    light = UsdLux.LightAPI(prim)
+    color = np.asarray(light.GetColorAttr().Get(time), np.float64)
+    if light.GetEnableColorTemperatureAttr().Get(time):
+        kelvin = float(light.GetColorTemperatureAttr().Get(time))
+        color = color * np.asarray(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+    exposure = float(np.clip(light.GetExposureAttr().Get(time), -100, 100))
+    emitted = color * light.GetIntensityAttr().Get(time) * 2**exposure
+    return np.asarray(np.nan_to_num(np.clip(emitted, 0, MAX_INTENSITY)), np.float64)
+
+
+class UsdLightReader:
+    """Reads the lights of one stage.
+
+    Attributes:
+        environment: light of the first dome; None without one.
+    """
+
+    def __init__(
+        self, time: Any, meters: float, images: UsdImages, collector: LightCollector, warnings: list[ImporterWarning]
+    ) -> None:
+        self._time, self._meters, self._images = time, meters, images
+        self._collector, self._warnings = collector, warnings
+        self.environment: Environment | None = None
+
+    def add(self, prim: Any, to_world: Shaped[F64, "4 4"]) -> None:
+        """Add a light; it emits along the −Z of its prim.
+
+        Args:
+            prim: a light of `KINDS`. to_world: from its space to meters.
+        Raises:
+            SceneError: there are more lights than a look can have.
+        """
+        kind, label = str(prim.GetTypeName()), f"light {quote(prim.GetName())}"
+        self._warn_links(prim, label)
+        if kind in DOMES:
+            self._add_dome(prim, to_world, label)
+            return
+        scale = np.linalg.norm(to_world[:3, :3], axis=0)
+        if np.abs(to_world[:3, 3]).max() > MAX_METERS or scale.min() < 1e-12:
+            self._warnings.append(unsupported(f"Skipped {label}: its scale is zero or its position is out of range."))
+            return
+        emitted = radiance(prim, self._time)
+        if not emitted.any():
+            self._warnings.append(ignored(f"Skipped {label}: it emits no light."))
+            return
+        fields = {
+            "position": to_world[:3, 3].tolist(),
+            "direction": (-to_world[:3, 2] / scale[2]).tolist(),
+        }
+        if kind == "DistantLight":
+            self._add_distant(prim, fields, emitted)
+        elif kind in ("RectLight", "DiskLight"):
+            self._add_flat(prim, kind, fields, emitted, to_world, scale, label)
+        else:
+            self._add_round(prim, kind, fields, emitted, scale, label)
+
+    def _number(self, prim: Any, name: str) -> float:
+        value = prim.GetAttribute(f"inputs:{name}").Get(self._time)
+        return float(value) if value is not None and np.isfinite(value) else 0.0
+
+    def _is_normalized(self, prim: Any) -> bool:
+        return bool(prim.GetAttribute("inputs:normalize").Get(self._time))
+
+    def _add_distant(self, prim: Any, fields: dict[str, Any], emitted: F64) -> None:
+        """Irradiance E = L π sin²(angle / 2); of a normalized light, or one without an angle, E = L."""
+        half_angle = np.radians(np.clip(self._number(prim, "angle"), 0, 180)) / 2
+        if half_angle > 0 and not self._is_normalized(prim):
+            emitted = emitted * np.pi * np.sin(half_angle) ** 2
+        self._collector.add(
+            self._collector.name(prim.GetName()), {"kind": "directional", "direction": fields["direction"]}, emitted
+        )
+
+    def _add_flat(
+        self, prim: Any, kind: str, fields: dict[str, Any], emitted: F64, to_world: F64, scale: F64, label: str
+    ) -> None:
+        """A rectangle; a disk becomes a square of its area, or with a cone a spot."""
+        if kind == "RectLight":
+            size = self._number(prim, "width") * scale[0], self._number(prim, "height") * scale[1]
+            area = size[0] * size[1]
+        else:
+            area = np.pi * self._number(prim, "radius") ** 2 * scale[0] * scale[1]
+            size = (np.sqrt(area), np.sqrt(area))
+        if area <= 0:
+            self._warnings.append(unsupported(f"Skipped {label}: it has no area."))
+            return
+        if self._is_normalized(prim):
+            emitted = emitted / (area / self._meters**2)
+        if kind == "DiskLight" and self._cone(prim) is not None:
+            self._add_spot(prim, fields, emitted * area, label)
+            return
+        if self._cone(prim) is not None:
+            self._warnings.append(unsupported(f"The cone of {label} isn't supported; it emits to all of its front."))
+        if kind == "DiskLight":
+            self._warnings.append(approximated(f"{_capital(label)} is shown as a square of the same area."))
+        emitted = emitted * self._image_mean(prim, label)
+        self._collector.add(
+            self._collector.name(prim.GetName()),
+            {"kind": "rectangle", **fields, "rotation": _rotation(to_world, scale), "size": [float(s) for s in size]},
+            emitted,
+        )
+
+    def _add_round(self, prim: Any, kind: str, fields: dict[str, Any], emitted: F64, scale: F64, label: str) -> None:
+        """A point with the mean intensity of a sphere, L π r², or of a cylinder, L π r l / 2."""
+        radius, length = self._number(prim, "radius"), self._number(prim, "length") * scale[0]
+        mean = float(np.cbrt(scale.prod()))
+        if kind == "CylinderLight":
+            radius *= float(np.sqrt(scale[1] * scale[2]))
+            section, area = np.pi * radius * length / 2, 2 * np.pi * radius * length
+        else:
+            radius *= mean
+            section, area = np.pi * radius**2, 4 * np.pi * radius**2
+        # a normalized one has L / area · section, where area = 4 section
+        intensity = emitted * self._meters**2 / 4 if self._is_normalized(prim) else emitted * section
+        if area <= 0 and not self._is_normalized(prim):
+            self._warnings.append(unsupported(f"Skipped {label}: it has no area."))
+            return
+        if self._cone(prim) is not None:
+            self._add_spot(prim, fields, intensity, label)
+            return
+        if not prim.GetAttribute("treatAsPoint").Get(self._time):
+            shape = "Sphere" if kind == "SphereLight" else "Cylinder"
+            self._warnings.append(approximated(f"{shape} {label} is shown as a point of the same power."))
+        self._collector.add(
+            self._collector.name(prim.GetName()), {"kind": "point", "position": fields["position"]}, intensity
+        )
+
+    def _cone(self, prim: Any) -> list[float] | None:
+        """Inner and outer half-angle of the cone of UsdLuxShapingAPI, degrees; None without one."""
+        angle = prim.GetAttribute("inputs:shaping:cone:angle").Get(self._time)
+        if angle is None or not 0 < angle < 90:
+            return None
+        softness = float(np.clip(prim.GetAttribute("inputs:shaping:cone:softness").Get(self._time) or 0.0, 0, 1))
+        return [float(angle) * (1 - softness), float(angle)]
+
+    def _add_spot(self, prim: Any, fields: dict[str, Any], intensity: F64, label: str) -> None:
+        for name, effect in (("focus", "focus"), ("ies:file", "IES profile")):
+            if prim.GetAttribute(f"inputs:shaping:{name}").Get(self._time):
+                self._warnings.append(unsupported(f"The {effect} of {label} isn't supported; its cone is even."))
+        self._collector.add(
+            self._collector.name(prim.GetName()), {"kind": "spot", **fields, "cone": self._cone(prim)}, intensity
+        )
+
+    def _image_mean(self, prim: Any, label: str) -> Shaped[F64, " 3"]:
+        """Mean color of a light's image; white without one."""
+        path = prim.GetAttribute("inputs:texture:file").Get(self._time)
+        if not path or not path.path:
+            return np.ones(3)
+        self._warnings.append(approximated(f"The texture of {label} was replaced by its average."))
+        return self._images.mean_color(path.path, f"the texture of {label}")
+
+    def _warn_links(self, prim: Any, label: str) -> None:
+        from pxr import UsdLux
+
+        light = UsdLux.LightAPI(prim)
+        for api, effect in (
+            (light.GetLightLinkCollectionAPI(), "lights"),
+            (light.GetShadowLinkCollectionAPI(), "shadows"),
+        ):
+            if api.GetIncludesRel().GetTargets() or api.GetExcludesRel().GetTargets():
+                self._warnings.append(unsupported(f"{_capital(label)} {effect} all objects: links aren't supported."))
+        if light.GetFiltersRel().GetTargets():
+            self._warnings.append(unsupported(f"Filters of {label} aren't supported."))
+
+    def _add_dome(self, prim: Any, to_world: F64, label: str) -> None:
+        """The environment; of several domes, the first."""
+        if self.environment is not None:
+            self._warnings.append(unsupported(f"Skipped {label}: the scene has another environment."))
+            return
+        emitted, name = radiance(prim, self._time), prim.GetName()[:80] or "dome"
+        path = prim.GetAttribute("inputs:texture:file").Get(self._time)
+        data = self._images.read(path.path) if path and path.path else None
+        uniform = Environment(name, np.ones((*UNIFORM_SIZE, 3), np.float32))
+        try:
+            image = uniform if data is None else read_environment(data, name)
+        except SceneError as error:
+            self._warnings.append(unsupported(f"The texture of {label} was skipped: {error}."))
+            image = uniform
+        if prim.GetAttribute("inputs:texture:format").Get(self._time) not in (None, "automatic", "latlong"):
+            self._warnings.append(unsupported(f"The texture of {label} is read as equirectangular."))
+        pixels = image.radiance if image is uniform else _rotate(image.radiance, to_world[:3, :3] @ self._pole(prim))
+        pixels = np.minimum(pixels * emitted.astype(np.float32), np.float32(MAX_EMISSION))
+        if pixels.any():
+            self.environment = Environment(name, pixels, image.warnings)
+        else:
+            self._warnings.append(ignored(f"Skipped {label}: it emits no light."))
+
+    def _pole(self, prim: Any) -> Shaped[F64, "3 3"]:
+        """Rotation of a dome whose image has its pole along the Z of a stage."""
+        from pxr import UsdGeom
+
+        axis = prim.GetAttribute("poleAxis").Get(self._time)
+        is_z_up = UsdGeom.GetStageUpAxis(prim.GetStage()) == UsdGeom.Tokens.z
+        if axis == "Z" or (axis == "scene" and is_z_up):
+            return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+        return np.eye(3)
+
+
+def _rotate(pixels: Shaped[F32, "height width 3"], to_world: Shaped[F64, "3 3"]) -> Shaped[F32, "height width 3"]:
+    """Rotate an image of USD, whose center faces +Z of its light and which turns to −X, into an environment."""
+    height, width, _ = pixels.shape
+    rotation = to_world / np.maximum(np.linalg.norm(to_world, axis=0), 1e-12)
+    directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64) @ rotation
+    # the center of an environment faces +X, and it turns to +Z
+    x, y, z = directions.T
+    local = np.stack([z, y, -x], axis=1).astype(np.float32)
+    return np.ascontiguousarray(lookup(pixels, local).reshape(height, width, 3), np.float32)
+
+
+def _capital(label: str) -> str:
+    return label[0].upper() + label[1:]
+
+
+def _rotation(to_world: F64, scale: F64) -> float:
+    """Rotation of a rectangle about its direction, degrees; see `relume.look.model.RectangleLook`."""
+    direction, up = -to_world[:3, 2] / scale[2], to_world[:3, 1] / scale[1]
+    vertical = np.array([0.0, 0.0, 1.0]) if abs(direction[1]) > 1 - 1e-6 else np.array([0.0, 1.0, 0.0])
+    height = vertical - direction * (vertical @ direction)
+    height /= np.linalg.norm(height)
+    return float(np.degrees(np.arctan2(np.cross(height, up) @ direction, height @ up)))
