@@ -30,7 +30,7 @@ from relume.scene_io.obj_ply.ply import Ply, read_ply
 from relume.scene_io.obj_ply.polygons import CutPolygons, triangulate
 from relume.scene_io.obj_ply.stl import read_stl
 from relume.scene_io.obj_ply.text import counted
-from relume.scene_io.obj_ply.weld import Corners, make_mesh
+from relume.scene_io.obj_ply.weld import Corners, make_mesh, used_rows
 from relume.scene_io.placement import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
 
@@ -299,7 +299,7 @@ def _recenter(positions: F64, vertices: I64, recenter: Recenter, warnings: list[
     """Positions relative to the new origin, and the origin: in double precision, before positions are rounded."""
     if vertices.size == 0:
         return positions, np.zeros(3)
-    used = positions[np.unique(vertices)]
+    used = used_rows(positions, vertices)
     origin = choose_origin(used.min(axis=0), used.max(axis=0), recenter)
     warnings.extend(moved_warning(origin))
     return (positions - origin if origin.any() else positions), origin

@@ -16,7 +16,7 @@ from relume.scene_io.obj_ply.text import counted
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
-CREASE = np.cos(np.radians(60.0))
+CREASE, HALF_CREASE = np.cos(np.radians([60.0, 30.0]))
 MIN_NORMAL = 1e-6  # length of a normal that counts as one
 MAX_FAN = 64  # triangles at a vertex that are compared pairwise; of more, only those close in file order
 
@@ -50,7 +50,7 @@ def make_mesh(
         warnings: gets one sentence for each omission or replacement.
     """
     triangles = corners.triangles
-    if not is_usable(corners.positions[np.unique(triangles[..., 0])]):
+    if not is_usable(used_rows(corners.positions, triangles[..., 0])):
         warnings.append(unsupported(f"Skipped {label}: it has positions that are NaN, infinite or huge."))
         return None
     solid = find_nondegenerate(corners.positions, triangles[..., 0], label, warnings)
@@ -67,6 +67,13 @@ def make_mesh(
     if material.normal_map is not None:
         tangents = compute_tangents(flat, normals, uvs, faces)
     return Mesh(name, flat, normals, tangents, uvs, faces, number)
+
+
+def used_rows(values: Shaped[F64, "rows columns"], indices: I64) -> Shaped[F64, "used columns"]:
+    """Rows that are named by at least one index, in their order."""
+    is_used = np.zeros(len(values), np.bool_)
+    is_used[indices] = True
+    return values[is_used]
 
 
 def _gather_values(values: F64, indices: I64, width: int) -> tuple[F64, int]:
@@ -116,10 +123,21 @@ def creased_normals(
         Unit normals of all corners.
     """
     cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    weighted = np.repeat(cross, 3, axis=0)
-    unit = weighted / np.linalg.norm(weighted, axis=1, keepdims=True)
-    order = np.argsort(vertex_indices.reshape(-1), kind="stable")
-    vertex, area, corner_normals = vertex_indices.reshape(-1)[order], weighted[order], unit[order]
+    unit = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    sums = np.stack([np.bincount(vertex_indices.ravel(), np.repeat(column, 3)) for column in cross.T], axis=1)
+    means = (sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), np.finfo(float).tiny))[vertex_indices]
+    is_smooth = np.ones(len(sums), np.bool_)  # each triangle within 30° of the mean: each pair within 60°
+    is_smooth[vertex_indices[np.einsum("tc,tkc->tk", unit, means) <= HALF_CREASE]] = False
+    creased = np.flatnonzero(~is_smooth[vertex_indices.ravel()])
+    normals = means.reshape(-1, 3)
+    normals[creased] = _pairwise_normals(vertex_indices.ravel()[creased], cross[creased // 3], unit[creased // 3])
+    return normals
+
+
+def _pairwise_normals(vertex_indices: Shaped[I64, " corners"], cross: F64, unit: F64) -> Shaped[F64, "corners 3"]:
+    """Compare each corner with all others of its vertex."""
+    order = np.argsort(vertex_indices, kind="stable")
+    vertex, area, corner_normals = vertex_indices[order], cross[order], unit[order]
     total = area.copy()
     first = np.arange(len(vertex) - 1)
     for step in range(1, MAX_FAN):
