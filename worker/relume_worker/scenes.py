@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
@@ -39,6 +40,7 @@ class SceneRecord:
         variants: partial looks of the file, by name.
         lights: names of the scene's lights.
         import_options: `relume.scene_io.import_options.ImportOptions` other than the defaults.
+        size: sides of the bounding box without a shadow catcher, meters; None in old rows.
     """
 
     id: str
@@ -52,6 +54,7 @@ class SceneRecord:
     lights: tuple[str, ...] = ()
     aspects: tuple[float | None, ...] = ()
     import_options: Mapping[str, str] = field(default_factory=dict)
+    size: tuple[float, float, float] | None = None
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
@@ -89,7 +92,17 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
         "import_options": scene.import_options,
+        "size": _size(scene),
     }
+
+
+def _size(scene: Scene) -> list[float]:
+    """Sides of the bounding box without a shadow catcher, if there is something else. Meters"""
+    is_catcher = [scene.materials[mesh.material].shadow_catcher for mesh in scene.meshes]
+    shown = [mesh for mesh, catches in zip(scene.meshes, is_catcher, strict=True) if not catches] or scene.meshes
+    low = np.min([mesh.positions.min(axis=0) for mesh in shown], axis=0)
+    high = np.max([mesh.positions.max(axis=0) for mesh in shown], axis=0)
+    return [float(side) for side in high - low]
 
 
 def insert_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
@@ -208,4 +221,5 @@ def _record(row: SceneRow) -> SceneRecord:
         lights=tuple(summary.get("lights", ())),
         aspects=tuple(summary.get("aspects", ())),
         import_options=summary.get("import_options", {}),
+        size=summary.get("size"),
     )
