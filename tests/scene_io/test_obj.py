@@ -80,7 +80,7 @@ def test_normals_average_the_triangles_within_the_crease_angle(height: float) ->
     x, y = np.meshgrid(np.arange(6.0), np.arange(6.0))
     points = np.stack([x, y, height * np.random.default_rng(0).random((6, 6))], axis=-1).reshape(-1, 3)
     first = (np.arange(5)[:, None] * 6 + np.arange(5)).reshape(-1, 1)
-    faces = np.concatenate([first + [0, 1, 7], first + [0, 7, 6]])
+    faces = np.concatenate([first + np.array([0, 1, 7]), first + np.array([0, 7, 6])])
     cross = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
     unit = cross / np.linalg.norm(cross, axis=1, keepdims=True)
     for row, normal in enumerate(creased_normals(points[faces], faces)):
