@@ -1,5 +1,5 @@
 /** Import preview, bake settings and costs, after an import or on request. Not modal: the page stays usable. */
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import type { SceneUpload } from "../session/net/upload";
 import { viewsToBake, type BakeSettings } from "../session/scene/bakeSettings";
@@ -23,6 +23,7 @@ interface BakeDialogProps {
 
 export function BakeDialog({ scene, upload, onReplaced, onClose, onOpen }: BakeDialogProps) {
   const panel = useRef<HTMLElement>(null);
+  const [drawnScene, setDrawnScene] = useState("");
   const reimport = useReimport(scene, upload, onReplaced);
   useReturnFocus(panel);
   useEffect(() => {
@@ -41,7 +42,11 @@ export function BakeDialog({ scene, upload, onReplaced, onClose, onOpen }: BakeD
         <h2>Bake “{scene.name}”</h2>
         <IconButton icon="close" label="Close" onClick={onClose} />
       </header>
-      <ImportPreview scene={scene} reimport={upload === null ? null : reimport} />
+      <ImportPreview
+        scene={scene}
+        reimport={upload === null ? null : reimport}
+        onDrawn={() => setDrawnScene(scene.id)}
+      />
       {scene.warnings.length > 0 && <ImportWarnings warnings={scene.warnings} />}
       <p>You can start on a quick preview; the full bake replaces it when ready and keeps your edits.</p>
       <div class="bake-settings" inert={reimport.isBusy}>
@@ -51,6 +56,7 @@ export function BakeDialog({ scene, upload, onReplaced, onClose, onOpen }: BakeD
           method={DEFAULT_BAKE_METHOD}
           views={viewsToBake(scene)}
           action="Open and bake"
+          plansWait={drawnScene !== scene.id}
           onChoose={onOpen}
         />
       </div>

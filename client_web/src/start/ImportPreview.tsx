@@ -13,6 +13,8 @@ interface ImportPreviewProps {
   scene: SceneBody;
   /** Null if the file is not at hand. */
   reimport: Reimport | null;
+  /** Called when the clay picture has arrived. */
+  onDrawn: () => void;
 }
 
 function SizeText({ size }: { size: NonNullable<SceneBody["size"]> }) {
@@ -27,13 +29,13 @@ function SizeText({ size }: { size: NonNullable<SceneBody["size"]> }) {
   );
 }
 
-export function ImportPreview({ scene, reimport }: ImportPreviewProps) {
+export function ImportPreview({ scene, reimport, onDrawn }: ImportPreviewProps) {
   const used = optionsText(scene.import_options);
   return (
     <div class="import-preview">
       <figure>
-        <ClayImage url={clayUrl(scene.id, CLAY_WIDTH)} label={`Clay picture of ${scene.name}`} />
-        <figcaption class="quiet">Clay picture: shape only. Up is up in the picture.</figcaption>
+        <ClayImage url={clayUrl(scene.id, CLAY_WIDTH)} label={`Clay picture of ${scene.name}`} onSettled={onDrawn} />
+        <figcaption class="quiet">Clay picture: shape only. Up in the picture is +Y.</figcaption>
       </figure>
       <div>
         {scene.size !== null && <SizeText size={scene.size} />}

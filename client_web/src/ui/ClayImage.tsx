@@ -6,10 +6,16 @@ interface ClayImageProps {
   /** Text for screen readers; empty: decoration. */
   label: string;
   isLazy?: boolean;
+  /** Called when the picture, or an error, has arrived. */
+  onSettled?: () => void;
 }
 
-export function ClayImage({ url, label, isLazy = false }: ClayImageProps) {
+export function ClayImage({ url, label, isLazy = false, onSettled }: ClayImageProps) {
   const [loaded, setLoaded] = useState({ url: "", isFailed: false });
+  const settle = (isFailed: boolean) => {
+    setLoaded({ url, isFailed });
+    onSettled?.();
+  };
   if (loaded.url === url && loaded.isFailed) return <span class="no-picture">No clay picture available</span>;
   return (
     <img
@@ -17,8 +23,8 @@ export function ClayImage({ url, label, isLazy = false }: ClayImageProps) {
       src={url}
       alt={label}
       loading={isLazy ? "lazy" : "eager"}
-      onLoad={() => setLoaded({ url, isFailed: false })}
-      onError={() => setLoaded({ url, isFailed: true })}
+      onLoad={() => settle(false)}
+      onError={() => settle(true)}
     />
   );
 }

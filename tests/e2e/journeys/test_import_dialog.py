@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -78,9 +79,8 @@ def test_options_turn_and_scale_the_scene_in_the_dialog(start: Page, server: Ser
     expect(clay).to_be_visible()
     columns, rows = silhouette(clay)
     assert rows > 2 * columns  # it stands
-    start.wait_for_load_state("networkidle")
+    expect(start.locator(".scene-card")).to_have_count(before + 1)  # those before are gone
     scenes = server.call("/api/scenes")
-    assert len(scenes) == before + 1  # those before are gone
     (scene,) = (each for each in scenes if each["name"] == "pillar")
     assert scene["import_options"] == {"up": "z", "unit": "mm", "recenter": "auto"}
     start.keyboard.press("Escape")
@@ -88,16 +88,14 @@ def test_options_turn_and_scale_the_scene_in_the_dialog(start: Page, server: Ser
     assert start.evaluate("document.activeElement.closest('main') !== null || document.activeElement === document.body")
 
 
-def test_an_option_that_is_impossible_is_explained(start: Page, pillar: Path) -> None:
-    pillar.write_text(pillar.read_text().replace("v 400 ", "v 400000000 "))
-    start.get_by_label("choose files").set_input_files([pillar])
-    start.get_by_label("Unit").select_option("Millimeters")
-    start.get_by_role("button", name="Import", exact=True).click()
-    dialog = start.get_by_role("region", name="Bake pillar")
-    expect(dialog.locator(".scene-size")).to_have_text("400,000 × 0.30 × 2.00 m")
+def test_a_refused_option_is_explained_and_taken_back(start: Page, pillar: Path) -> None:
+    dialog = import_pillar(start, pillar)
+    expect(dialog.locator(CLAY)).to_be_visible()
+    refusal = json.dumps({"title": "Unprocessable Content", "detail": "the scene is too large; choose a smaller unit"})
+    start.route("**/api/scenes", lambda route: route.fulfill(status=422, body=refusal))
     dialog.get_by_label("Unit").select_option("Meters")
-    expect(dialog.get_by_role("alert")).to_contain_text("choose a smaller unit")
-    expect(dialog.get_by_label("Unit").locator("option:checked")).to_have_text("Millimeters")
+    expect(dialog.get_by_role("alert")).to_contain_text("Options unchanged: the scene is too large")
+    expect(dialog.get_by_label("Unit").locator("option:checked")).to_have_text("As in file")
 
 
 def test_four_warnings_of_a_kind_are_one_line(start: Page, pillar: Path) -> None:
