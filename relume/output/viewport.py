@@ -16,6 +16,7 @@ from relume.brdf.texture_slots import TEXTURES, user_images
 from relume.core.color import srgb_encode
 from relume.images.image_store import load_texture
 from relume.look import default_look
+from relume.math.bounding_box import bounding_box
 from relume.output.clay import clay_image
 from relume.raytrace.camera_rays import Hits, camera_directions, near_distances, trace_rays
 from relume.raytrace.interior import first_obstacle, interior_camera, sees_only_outside
@@ -56,14 +57,14 @@ class Viewport:
         geometry = build_scene_buffers(scene)
         terms = default_look(scene.materials, scene.lights)["materials"]
         colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
-        corners = geometry.positions[geometry.faces.ravel()]
-        bounds = corners.min(axis=0).astype(np.float64), corners.max(axis=0).astype(np.float64)
+        low, high = bounding_box(geometry.positions[geometry.faces.ravel()])
         return cls(
             geometry,
             np.array(colors, np.float32),
             [material.name for material in scene.materials],
             framing_camera(scene.meshes, "framing"),
-            *bounds,
+            low.astype(np.float64),
+            high.astype(np.float64),
             next(iter(scene.cameras), None),
         )
 

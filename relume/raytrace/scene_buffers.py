@@ -10,6 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
+from relume.math.bounding_box import bounding_box
 from relume.raytrace.alpha_filter import IGNORE_GLASS, AlphaTest
 from relume.raytrace.alpha_test import collect_alpha_masks
 from relume.raytrace.camera_rays import trace_rays
@@ -81,7 +82,8 @@ class SceneBuffers:
 def ray_epsilon(positions: Shaped[F32, "n 3"]) -> float:
     """Offset of ray origins from surfaces with these vertices, meters."""
     # rounding of float32 grows with the distance from the world's origin, so the offset depends on it and on the size
-    return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
+    low, high = bounding_box(positions)
+    return 1e-5 * float(max(-low.min(), high.max()) + np.linalg.norm(high - low))
 
 
 def is_front(

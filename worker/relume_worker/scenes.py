@@ -18,6 +18,7 @@ from sqlalchemy.exc import IntegrityError
 from relume.core.errors import DiskFullError, NotFoundError
 from relume.core.filesystem import remove_folder
 from relume.core.import_warnings import ImporterWarning, warning_of
+from relume.math.bounding_box import bounding_box
 from relume.scene.model import Scene
 from relume.scene.scene_folder import save_scene
 from relume.scene.triplanar import find_triplanar
@@ -100,8 +101,7 @@ def _size(scene: Scene) -> list[float]:
     """Sides of the bounding box without a shadow catcher, if there is something else. Meters"""
     is_catcher = [scene.materials[mesh.material].shadow_catcher for mesh in scene.meshes]
     shown = [mesh for mesh, catches in zip(scene.meshes, is_catcher, strict=True) if not catches] or scene.meshes
-    low = np.min([mesh.positions.min(axis=0) for mesh in shown], axis=0)
-    high = np.max([mesh.positions.max(axis=0) for mesh in shown], axis=0)
+    low, high = bounding_box(np.concatenate([bounding_box(mesh.positions) for mesh in shown]))
     return [float(side) for side in high - low]
 
 

@@ -14,6 +14,7 @@ from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
+from relume.math.bounding_box import bounding_box
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, TextureEncoding
@@ -300,7 +301,7 @@ def _recenter(positions: F64, vertices: I64, recenter: Recenter, warnings: list[
     if vertices.size == 0:
         return positions, np.zeros(3)
     used = used_rows(positions, vertices)
-    origin = choose_origin(used.min(axis=0), used.max(axis=0), recenter)
+    origin = choose_origin(*bounding_box(used), recenter)
     warnings.extend(moved_warning(origin))
     return (positions - origin if origin.any() else positions), origin
 
