@@ -25,7 +25,7 @@ _ROUNDS = 3
 _WIDTH = 480
 
 
-class _Waits(NamedTuple):
+class _ImportTimes(NamedTuple):
     """Seconds from the end of the upload to the registered scene, and to its picture."""
 
     registered_s: float
@@ -43,7 +43,7 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure("import.clay_s", fastest.clay_s, "s", context)]
 
 
-def _import(port: int, size: int, height: float) -> _Waits:
+def _import(port: int, size: int, height: float) -> _ImportTimes:
     positions, faces = grid(size)
     positions[:, 2] *= height
     content_type, body = _form({"scene": ply_bytes(positions, faces)})
@@ -54,7 +54,7 @@ def _import(port: int, size: int, height: float) -> _Waits:
     registered_s = time.perf_counter() - start_time
     connection.request("GET", f"/api/scenes/{scene}/clay.png?width={_WIDTH}")
     _read(connection, 200)
-    return _Waits(registered_s, time.perf_counter() - start_time)
+    return _ImportTimes(registered_s, time.perf_counter() - start_time)
 
 
 def _form(files: Mapping[str, bytes]) -> tuple[str, bytes]:

@@ -13,7 +13,7 @@ import { useReimport } from "./useReimport";
 
 interface BakeDialogProps {
   scene: SceneBody;
-  /** The import of the scene; null if its files are not at hand. */
+  /** The import of the scene; null if the page does not have its files. */
   upload: SceneUpload | null;
   /** Called with the scene of an import with other options, and the id of the one before. */
   onReplaced: (scene: SceneBody, replaced: string) => void;

@@ -1,4 +1,4 @@
-/** What an import made of a file: clay picture, size, and the options to change it while the file is at hand. */
+/** What an import made of a file: clay picture, size, and options to import the file again. */
 import type { SceneBody } from "../protocol";
 import { clayUrl } from "../session/net/api";
 import { ClayImage } from "../ui/ClayImage";
@@ -11,7 +11,7 @@ const CLAY_WIDTH = 480;
 
 interface ImportPreviewProps {
   scene: SceneBody;
-  /** Null if the file is not at hand. */
+  /** Null if the page does not have the file. */
   reimport: Reimport | null;
   /** Called when the clay picture has arrived. */
   onDrawn: () => void;
