@@ -39,7 +39,7 @@ class Viewport:
 
     Attributes:
         colors: colors of the materials, linear. material_names: of the scene.
-        default_camera: a camera that frames the scene. bounds_min, bounds_max: corners of its bounds, meters.
+        default_camera: a camera that frames the scene.
         first_camera: the scene's own; None without one.
     """
 
@@ -47,32 +47,42 @@ class Viewport:
     colors: Shaped[F32, "materials 3"]
     material_names: Sequence[str]
     default_camera: Camera
-    bounds_min: Shaped[F64, " 3"]
-    bounds_max: Shaped[F64, " 3"]
     first_camera: Camera | None
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Viewport:
-        """Build the acceleration structure, and compute bounds and colors."""
+        """Build the acceleration structure, and compute colors."""
         geometry = build_scene_buffers(scene)
         terms = default_look(scene.materials, scene.lights)["materials"]
         colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
-        low, high = bounding_box(geometry.positions[geometry.faces.ravel()])
         return cls(
             geometry,
             np.array(colors, np.float32),
             [material.name for material in scene.materials],
             framing_camera(scene.meshes, "framing"),
-            low.astype(np.float64),
-            high.astype(np.float64),
             next(iter(scene.cameras), None),
         )
 
     @cached_property
+    def _bounds(self) -> Sequence[Shaped[F64, " 3"]]:
+        return [
+            corner.astype(np.float64) for corner in bounding_box(self.geometry.positions[self.geometry.faces.ravel()])
+        ]
+
+    @property
+    def bounds_min(self) -> Shaped[F64, " 3"]:
+        """Lowest coordinates of its triangles, meters."""
+        return self._bounds[0]
+
+    @property
+    def bounds_max(self) -> Shaped[F64, " 3"]:
+        """Highest coordinates of its triangles, meters."""
+        return self._bounds[1]
+
+    @cached_property
     def interior_camera(self) -> Camera | None:
         """A camera in the largest room; None if no place is enclosed."""
-        bounds = self.bounds_min, self.bounds_max
-        return interior_camera(self.geometry.embree, self.geometry.face_normals, bounds, "inside")
+        return interior_camera(self.geometry.embree, self.geometry.face_normals, self._bounds, "inside")
 
     @cached_property
     def opens_inside(self) -> bool:

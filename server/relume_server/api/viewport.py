@@ -38,6 +38,11 @@ class JpegResponse(Response):
 async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
     """Bounds of a scene; reads the scene, which may take seconds."""
     viewport = await open_viewport(scene, services)
+    return await services.pictures.run(("bounds", scene), lambda: _body(viewport))
+
+
+def _body(viewport: PlacementViewport) -> ViewportBody:
+    """Describe it; finds a room first, which takes as long as reading the scene."""
     interior = viewport.interior_camera
     return ViewportBody(
         bounds_min=viewport.bounds_min.tolist(),
