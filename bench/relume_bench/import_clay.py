@@ -13,6 +13,7 @@ import tempfile
 import time
 import uuid
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,14 +48,14 @@ def _import(port: int, size: int, height: float) -> _ImportTimes:
     positions, faces = grid(size)
     positions[:, 2] *= height
     content_type, body = _form({"scene": ply_bytes(positions, faces)})
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=300)
-    connection.request("POST", "/api/scenes", body, {"Content-Type": content_type})  # returns when all is sent
-    start_time = time.perf_counter()
-    scene = json.loads(_read(connection, 201))["id"]
-    registered_s = time.perf_counter() - start_time
-    connection.request("GET", f"/api/scenes/{scene}/clay.png?width={_WIDTH}")
-    _read(connection, 200)
-    return _ImportTimes(registered_s, time.perf_counter() - start_time)
+    with closing(http.client.HTTPConnection("127.0.0.1", port, timeout=300)) as connection:
+        connection.request("POST", "/api/scenes", body, {"Content-Type": content_type})  # returns when all is sent
+        start_time = time.perf_counter()
+        scene = json.loads(_read(connection, 201))["id"]
+        registered_s = time.perf_counter() - start_time
+        connection.request("GET", f"/api/scenes/{scene}/clay.png?width={_WIDTH}")
+        _read(connection, 200)
+        return _ImportTimes(registered_s, time.perf_counter() - start_time)
 
 
 def _form(files: Mapping[str, bytes]) -> tuple[str, bytes]:
