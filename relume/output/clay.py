@@ -65,7 +65,7 @@ def _radiance(geometry: SceneBuffers, camera: Camera, size: tuple[int, int], sta
 def _pattern(x: NDArray[np.int64], y: NDArray[np.int64]) -> NDArray[np.int64]:
     """Index of the occlusion rays of a sample: those of a pixel are evenly distributed over all."""
     (pixel_x, sample_x), (pixel_y, sample_y) = np.divmod(x, _SUPERSAMPLING), np.divmod(y, _SUPERSAMPLING)
-    return pixel_x % 2 + 2 * (pixel_y % 2) + _PATTERNS * (sample_x + _SUPERSAMPLING * sample_y)
+    return np.asarray(pixel_x % 2 + 2 * (pixel_y % 2) + _PATTERNS * (sample_x + _SUPERSAMPLING * sample_y))
 
 
 def _occlusion(
