@@ -27,8 +27,8 @@ _ROUNDS = 3
 
 def measure(tiny: bool) -> list[Figure]:
     """Both formats, each with our reader and, if installed, with the library for it."""
-    positions, faces = _grid(8 if tiny else 707)
-    obj, ply = _obj_text(positions, faces), _ply_bytes(positions, faces)
+    positions, faces = grid(8 if tiny else 707)
+    obj, ply = _obj_text(positions, faces), ply_bytes(positions, faces)
     return [
         _figure("import.obj", len(faces), obj, lambda: _read_obj(obj), "tinyobjloader", _by_tinyobjloader),
         _figure("import.ply", len(faces), ply, lambda: _read_ply(ply), "plyfile", _by_plyfile),
@@ -65,7 +65,7 @@ def _figure(
     return Figure(name, fastest[0], "s", context)
 
 
-def _grid(size: int) -> tuple[F32, I32]:
+def grid(size: int) -> tuple[F32, I32]:
     """2 · size² triangles of rough terrain. (n, 3) and (num_triangles, 3)"""
     y, x = np.mgrid[0 : size + 1, 0 : size + 1]
     height = np.random.default_rng(0).random(x.shape)
@@ -84,7 +84,8 @@ def _obj_text(positions: F32, faces: I32) -> bytes:
     return text.getvalue().encode()
 
 
-def _ply_bytes(positions: F32, faces: I32) -> bytes:
+def ply_bytes(positions: F32, faces: I32) -> bytes:
+    """Encode triangles as a binary PLY."""
     columns = "".join(f"property float {name}\n" for name in "xyz")
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(positions)}\n{columns}"
     header += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"

@@ -900,7 +900,7 @@ export interface RoomUpdate {
   edited_by: number[];
 }
 
-/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. `import_options`: for the next import of its file. */
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. `import_options`: for the next import of its file. `size`: sides of its bounding box along x, y and z without a shadow catcher, meters; null for a scene of an older version. */
 export interface SceneBody {
   id: string;
   name: string;
@@ -911,6 +911,7 @@ export interface SceneBody {
   variants: SceneVariant[];
   warnings: SceneWarning[];
   import_options: ImportOptions;
+  size: [number, number, number] | null;
   triangles: number;
   thumbnail: string | null;
   bakes: string[];

@@ -18,6 +18,7 @@ export type {
   DryRunBody,
   EnvironmentBody,
   ImageBody,
+  ImportOptions,
   ViewportBody,
   FrameHeader,
   FreeCameraError,

@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 import { nextCameraName } from "../src/viewport/cameras/cameraRequests";
 import { TouchGestures } from "../src/viewport/cameras/touchGestures";
 import { saveCameraAs } from "../src/viewport/cameras/savedCameras";
-import { PlacementImages } from "../src/viewport/cameras/placementImages";
+import { LatestRequest } from "../src/session/net/latestRequest";
 import {
   dollyOrbit,
   interpolateOrbits,
@@ -142,23 +142,23 @@ describe("a camera that goes round a place", () => {
   });
 });
 
-describe("pictures of where a camera is", () => {
+describe("requests of a changing value", () => {
   it("are asked for one at a time, then the newest; what fails does not end it", async () => {
     const requests: number[] = [];
     const drawn: unknown[] = [];
     const failed: unknown[] = [];
     const answers: ((picture: Blob | null) => void)[] = [];
-    const images = new PlacementImages(
-      (_, size) =>
-        new Promise((resolve, reject) => {
-          requests.push(size[0]);
+    const images = new LatestRequest(
+      (width: number) =>
+        new Promise<Blob>((resolve, reject) => {
+          requests.push(width);
           answers.push((picture) => (picture === null ? reject(new Error("gone")) : resolve(picture)));
         }),
       (picture) => Promise.resolve(void drawn.push(picture)),
       (error) => failed.push(error),
     );
     const settle = () => new Promise((resolve) => setTimeout(resolve));
-    for (const width of [1, 2, 3]) images.show(poseOf(orbit), [width, 1]);
+    for (const width of [1, 2, 3]) images.send(width);
     expect(requests).toEqual([1]);
     answers[0]?.(null);
     await settle();
@@ -167,7 +167,7 @@ describe("pictures of where a camera is", () => {
     answers[1]?.(new Blob());
     await settle();
     expect(drawn).toHaveLength(1);
-    images.show(poseOf(orbit), [4, 1]);
+    images.send(4);
     images.close();
     answers[2]?.(new Blob());
     await settle();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from relume.brdf.texture_slots import TEXTURES, user_images
 from relume.core.color import srgb_encode
 from relume.images.image_store import load_texture
 from relume.look import default_look
+from relume.math.bounding_box import bounding_box
+from relume.output.clay import clay_image
 from relume.raytrace.camera_rays import Hits, camera_directions, near_distances, trace_rays
 from relume.raytrace.interior import first_obstacle, interior_camera, sees_only_outside
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
@@ -36,39 +39,60 @@ class Viewport:
 
     Attributes:
         colors: colors of the materials, linear. material_names: of the scene.
-        default_camera: a camera that frames the scene. bounds_min, bounds_max: corners of its bounds, meters.
-        interior_camera: a camera in its largest room; None if no place is enclosed.
-        opens_inside: True for a closed room whose first camera is outside.
+        default_camera: a camera that frames the scene.
+        first_camera: the scene's own; None without one.
     """
 
     geometry: SceneBuffers
     colors: Shaped[F32, "materials 3"]
     material_names: Sequence[str]
     default_camera: Camera
-    bounds_min: Shaped[F64, " 3"]
-    bounds_max: Shaped[F64, " 3"]
-    interior_camera: Camera | None
-    opens_inside: bool
+    first_camera: Camera | None
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Viewport:
-        """Build the acceleration structure, and compute bounds and colors."""
+        """Build the acceleration structure, and compute colors."""
         geometry = build_scene_buffers(scene)
         terms = default_look(scene.materials, scene.lights)["materials"]
         colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
-        corners = geometry.positions[geometry.faces.ravel()]
-        bounds = corners.min(axis=0).astype(np.float64), corners.max(axis=0).astype(np.float64)
-        rays = geometry.embree, geometry.face_normals
-        interior = interior_camera(*rays, bounds, "inside")
         return cls(
             geometry,
             np.array(colors, np.float32),
             [material.name for material in scene.materials],
             framing_camera(scene.meshes, "framing"),
-            *bounds,
-            interior,
-            sees_only_outside(*rays, next(iter(scene.cameras), None), interior),
+            next(iter(scene.cameras), None),
         )
+
+    @cached_property
+    def _bounds(self) -> Sequence[Shaped[F64, " 3"]]:
+        return [
+            corner.astype(np.float64) for corner in bounding_box(self.geometry.positions[self.geometry.faces.ravel()])
+        ]
+
+    @property
+    def bounds_min(self) -> Shaped[F64, " 3"]:
+        """Lowest coordinates of its triangles, meters."""
+        return self._bounds[0]
+
+    @property
+    def bounds_max(self) -> Shaped[F64, " 3"]:
+        """Highest coordinates of its triangles, meters."""
+        return self._bounds[1]
+
+    @cached_property
+    def interior_camera(self) -> Camera | None:
+        """A camera in the largest room; None if no place is enclosed."""
+        return interior_camera(self.geometry.embree, self.geometry.face_normals, self._bounds, "inside")
+
+    @cached_property
+    def opens_inside(self) -> bool:
+        """True for a closed room whose first camera is outside."""
+        rays = self.geometry.embree, self.geometry.face_normals
+        return sees_only_outside(*rays, self.first_camera, self.interior_camera)
+
+    def clay(self, camera: Camera, size: tuple[int, int]) -> Shaped[NDArray[np.uint8], "height width"]:
+        """Render the clay picture of a camera; see `clay_image`."""
+        return clay_image(self.geometry, camera, size)
 
     def image(self, camera: Camera, size: tuple[int, int]) -> Shaped[NDArray[np.uint8], "height width 3"]:
         """Render display values for a camera, with light from the camera and from above.
@@ -86,10 +110,8 @@ class Viewport:
         return np.asarray(np.rint(255 * srgb_encode(colors)), np.uint8).reshape(height, width, 3)
 
     def _shade(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
-        """Shade hits by their normals alone; `surface_at` computes more and takes several times as long. (n, 3)"""
-        corners, (u, v) = self.geometry.normals[self.geometry.faces[face]], uv.T[:, :, None]
-        normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        """Shade hits by their normals alone. (n, 3)"""
+        normal = self.geometry.smooth_normals(face, uv)
         cosine = -np.einsum("nc,nc->n", normal, directions)
         upward = normal[:, 1] * np.sign(cosine)  # of the visible side
         shading = _AMBIENT + _HEADLIGHT * np.abs(cosine) + _SKYLIGHT * (0.5 + 0.5 * upward)

@@ -92,7 +92,7 @@ def find_surroundings(
     Args:
         embree: the triangles. face_normals: their outer normals. points: meters.
     """
-    directions = _sphere_directions(_NUM_DIRECTIONS)
+    directions = sphere_directions(_NUM_DIRECTIONS)
     num, all_directions = len(points), np.tile(directions, (len(points), 1))
     origins = np.repeat(points, _NUM_DIRECTIONS, axis=0).astype(np.float32)
     hits = trace_rays(embree, origins, all_directions, STOP_AT_OPAQUE)
@@ -195,7 +195,7 @@ def _with_back_to_wall(embree: EmbreeScene, position: Shaped[F64, " 3"]) -> tupl
     return position - max(0.0, behind - _WALL_MARGIN * depth[view]) * directions[view], directions[view]
 
 
-def _sphere_directions(num: int) -> F32:
+def sphere_directions(num: int) -> F32:
     """Fibonacci points on the unit sphere."""
     index = np.arange(num) + 0.5
     z, azimuth = 1 - 2 * index / num, np.pi * (1 + 5**0.5) * index

@@ -19,7 +19,9 @@ def merge_by_material(meshes: Iterable[Mesh]) -> list[Mesh]:
 
 
 def merge_meshes(meshes: Sequence[Mesh]) -> Mesh:
-    """Merge meshes into one with the name and material of the first."""
+    """Merge meshes into one with the name and material of the first; a single one stays as it is."""
+    if len(meshes) == 1:
+        return meshes[0]
     starts = accumulate((len(mesh.positions) for mesh in meshes[:-1]), initial=0)
     positions, normals, tangents, uvs = (
         np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in ("positions", "normals", "tangents", "uvs")

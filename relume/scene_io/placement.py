@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, by_severity, ignored
+from relume.math.bounding_box import bounding_box
 from relume.scene.collect_lights import mesh_area
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
@@ -73,8 +74,7 @@ def place(scene: Scene, options: ImportOptions) -> Scene:
 
 def bounds(scene: Scene) -> tuple[Shaped[F64, " 3"], Shaped[F64, " 3"]]:
     """Return the lowest and the highest coordinates of a scene's vertices."""
-    low = np.min([mesh.positions.min(axis=0) for mesh in scene.meshes], axis=0)
-    high = np.max([mesh.positions.max(axis=0) for mesh in scene.meshes], axis=0)
+    low, high = bounding_box(np.concatenate([bounding_box(mesh.positions) for mesh in scene.meshes]))
     return low.astype(np.float64), high.astype(np.float64)
 
 

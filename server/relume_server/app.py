@@ -16,6 +16,7 @@ from relume_server import errors, openapi
 from relume_server.api import (
     bakes,
     cameras,
+    clay,
     client,
     color,
     comments,
@@ -58,6 +59,7 @@ ROUTE_GROUPS = (
     cameras,
     comments,
     viewport,
+    clay,
     examples,
     color,
     models,

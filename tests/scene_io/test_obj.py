@@ -75,6 +75,20 @@ def test_a_cube_is_flat_and_a_fine_ball_is_round() -> None:
     assert (normals * points[ball].reshape(-1, 3)).sum(1).min() > np.cos(np.radians(7.5))
 
 
+@pytest.mark.parametrize("height", [0.05, 0.4, 2.0])
+def test_normals_average_the_triangles_within_the_crease_angle(height: float) -> None:
+    x, y = np.meshgrid(np.arange(6.0), np.arange(6.0))
+    points = np.stack([x, y, height * np.random.default_rng(0).random((6, 6))], axis=-1).reshape(-1, 3)
+    first = (np.arange(5)[:, None] * 6 + np.arange(5)).reshape(-1, 1)
+    faces = np.concatenate([first + np.array([0, 1, 7]), first + np.array([0, 7, 6])])
+    cross = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    unit = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    for row, normal in enumerate(creased_normals(points[faces], faces)):
+        neighbors = (faces == faces[row // 3, row % 3]).any(axis=1) & (unit @ unit[row // 3] > 0.5)
+        total = cross[neighbors].sum(axis=0)
+        np.testing.assert_allclose(normal, total / np.linalg.norm(total), atol=1e-12)
+
+
 def _ball(steps: int) -> tuple[np.ndarray, np.ndarray]:
     theta, phi = np.linspace(0.05, np.pi - 0.05, steps), np.arange(steps) * 2 * np.pi / steps
     sin, cos = np.sin(theta)[:, None], np.cos(theta)[:, None]

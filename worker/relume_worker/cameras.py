@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TypeAlias
 
 from sqlalchemy import delete, func, select
@@ -13,6 +14,8 @@ from sqlalchemy.orm import Session
 
 from relume.core.errors import NotFoundError, ParameterError
 from relume.scene.custom_camera import CustomCamera, read_custom_camera
+from relume.scene.model import Camera
+from relume.scene.scene_folder import load_cameras
 from relume_worker.database.models import CameraRow
 from relume_worker.ledger import Ledger
 from relume_worker.scenes import SceneRecord, get_scene
@@ -37,6 +40,24 @@ def camera_names_by_scene(ledger: Ledger) -> dict[str, list[str]]:
         for scene_id, name in session.execute(select(CameraRow.scene_id, CameraRow.name).order_by(CameraRow.name)):
             names[scene_id].append(name)
     return names
+
+
+def get_camera(folder: Path, ledger: Ledger, scene_id: str, name: str | None) -> Camera:
+    """Return a camera of the file or a placed one; without a name, the first of the file.
+
+    Args:
+        folder: of the scene. ledger: ledger with the placed cameras. scene_id: id of the scene. name: of the camera.
+    Raises:
+        NotFoundError: the scene has no such camera. SceneError: its cameras cannot be read.
+    """
+    cameras = load_cameras(folder)
+    if name is None:
+        return cameras[0]
+    placed = [camera.camera for camera in list_cameras(ledger, scene_id)]
+    for camera in (*cameras, *placed):
+        if camera.name == name:
+            return camera
+    raise NotFoundError(f"the scene has no camera {name[:80]!r}; place it first")
 
 
 def store_camera(ledger: Ledger, scene_id: str, camera: CustomCamera) -> bool:

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
 from relume.core.errors import DiskFullError, NotFoundError
 from relume.core.filesystem import remove_folder
 from relume.core.import_warnings import ImporterWarning, warning_of
+from relume.math.bounding_box import bounding_box
 from relume.scene.model import Scene
 from relume.scene.scene_folder import save_scene
 from relume.scene.triplanar import find_triplanar
@@ -39,6 +41,7 @@ class SceneRecord:
         variants: partial looks of the file, by name.
         lights: names of the scene's lights.
         import_options: `relume.scene_io.import_options.ImportOptions` other than the defaults.
+        size: sides of the bounding box without a shadow catcher, meters; None in old rows.
     """
 
     id: str
@@ -52,6 +55,7 @@ class SceneRecord:
     lights: tuple[str, ...] = ()
     aspects: tuple[float | None, ...] = ()
     import_options: Mapping[str, str] = field(default_factory=dict)
+    size: tuple[float, float, float] | None = None
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
@@ -89,7 +93,16 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
         "import_options": scene.import_options,
+        "size": _size(scene),
     }
+
+
+def _size(scene: Scene) -> list[float]:
+    """Sides of the bounding box without a shadow catcher, if there is something else. Meters"""
+    is_catcher = [scene.materials[mesh.material].shadow_catcher for mesh in scene.meshes]
+    shown = [mesh for mesh, catches in zip(scene.meshes, is_catcher, strict=True) if not catches] or scene.meshes
+    low, high = bounding_box(np.concatenate([bounding_box(mesh.positions) for mesh in shown]))
+    return [float(side) for side in high - low]
 
 
 def insert_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
@@ -208,4 +221,5 @@ def _record(row: SceneRow) -> SceneRecord:
         lights=tuple(summary.get("lights", ())),
         aspects=tuple(summary.get("aspects", ())),
         import_options=summary.get("import_options", {}),
+        size=summary.get("size"),
     )

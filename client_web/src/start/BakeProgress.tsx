@@ -16,8 +16,8 @@ export function BakeProgress({ scene, onReady }: { scene: SceneBody; onReady: ()
     });
   }, [newest, onReady]);
   return (
-    <span class="no-picture">
-      {bake === null ? (newest === undefined ? "No preview yet" : "…") : bakeProgressText(bake, elapsed)}
+    <span class="bake-progress">
+      {bake === null ? (newest === undefined ? "Not baked: clay picture" : "…") : bakeProgressText(bake, elapsed)}
       {bake?.state === "running" && (
         <progress max={1} value={hasProgress(bake) ? bake.progress : undefined} aria-label={`Bake of ${scene.name}`} />
       )}

@@ -13,11 +13,12 @@ import {
   type ImportSelection,
 } from "./files/sceneFiles";
 import { startPageRejection } from "./files/rejections";
-import type { SceneBody } from "../protocol";
 import { clearErrors, showError } from "../ui/toasts";
 import { ChosenFiles } from "./ChosenFiles";
+import { ImportOptionsForm } from "./ImportOptionsForm";
+import { DEFAULT_OPTIONS } from "./importOptions";
 import { useFileDrop } from "./useFileDrop";
-import { useImport, type UploadState } from "./useImport";
+import { useImport, type ImportedScene, type UploadState } from "./useImport";
 
 const EMPTY_SELECTION: ImportSelection = { scenes: [], environment: null };
 
@@ -73,9 +74,10 @@ function UploadStatus({ name, fraction, number, count }: UploadState) {
   );
 }
 
-export function DropZone({ onImported }: { onImported: (scenes: SceneBody[]) => void }) {
+export function DropZone({ onImported }: { onImported: (scenes: ImportedScene[]) => void }) {
   const [files, setFiles] = useState<readonly DroppedFile[]>([]);
   const [withGround, setWithGround] = useState(false);
+  const [options, setOptions] = useState(DEFAULT_OPTIONS);
   const { upload, problems, clearProblems, send } = useImport();
   const selection = useSortedFiles(files);
   const { scenes, environment } = selection;
@@ -91,12 +93,14 @@ export function DropZone({ onImported }: { onImported: (scenes: SceneBody[]) => 
     clearErrors("files");
     clearProblems();
     setFiles([]);
+    setOptions(DEFAULT_OPTIONS);
   };
   const isDropTarget = useFileDrop(addFiles);
   /** Rejected scenes stay chosen, so that missing files can be added. */
   const sendAll = async () => {
-    const { imported, done } = await send(selection, withGround);
+    const { imported, done } = await send(selection, withGround, options);
     setFiles((current) => (done.size === scenes.length ? [] : current.filter(({ path }) => !done.has(path))));
+    if (done.size === scenes.length) setOptions(DEFAULT_OPTIONS);
     if (imported.length > 0) onImported(imported);
   };
   return (
@@ -114,6 +118,7 @@ export function DropZone({ onImported }: { onImported: (scenes: SceneBody[]) => 
         problems={problems}
         onLeaveOut={(path) => setFiles((before) => before.filter((each) => each.path !== path))}
       />
+      {scenes.length > 0 && <ImportOptionsForm options={options} onChange={setOptions} />}
       <div class="chosen">
         <span class={environment ? "" : "quiet"}>
           {environment === null ? "Default studio lighting" : `HDRI: ${environment.name}`}

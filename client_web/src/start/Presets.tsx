@@ -33,11 +33,13 @@ function usePlans(
   views: readonly string[],
   relightable: boolean,
   aspect: number,
+  waits: boolean,
 ): PresetPlans {
   const [plans, setPlans] = useState<PresetPlans>({});
   useEffect(() => {
     let stale = false;
     setPlans({});
+    if (waits) return undefined;
     for (const { name } of PRESETS) {
       planBake({ scene, method, preset: name, aspect, views: [...views], relightable }).then(
         (plan) => !stale && setPlans((previous) => ({ ...previous, [name]: plan })),
@@ -47,7 +49,7 @@ function usePlans(
     return () => {
       stale = true;
     };
-  }, [scene, method, views, relightable, aspect]);
+  }, [scene, method, views, relightable, aspect, waits]);
   return plans;
 }
 
@@ -97,6 +99,8 @@ interface PresetsProps {
   size?: BakeSize | null;
   /** Initial pose of a new camera; null: the scene's first camera. */
   from?: CameraPose | null;
+  /** True while something else is more urgent for the server than the costs. */
+  plansWait?: boolean;
   onChoose: (choice: BakeSettings) => void;
 }
 
@@ -107,6 +111,7 @@ export function Presets({
   action,
   size = null,
   from = null,
+  plansWait = false,
   onChoose,
 }: PresetsProps) {
   const [method, setMethod] = useState(initialMethod);
@@ -117,7 +122,7 @@ export function Presets({
   );
   const [shape, setShape] = useState(initialShape);
   const { aspect } = shape;
-  const plans = usePlans(scene.id, method, selectedViews, relightable, aspect);
+  const plans = usePlans(scene.id, method, selectedViews, relightable, aspect, plansWait);
   return (
     <>
       <MethodPicker selected={method} onChoose={setMethod} />

@@ -1,6 +1,8 @@
 import { useState } from "preact/hooks";
 import type { SceneBody } from "../protocol";
+import { clayUrl } from "../session/net/api";
 import { mayEdit } from "../state/sessionUser";
+import { ClayImage } from "../ui/ClayImage";
 import { IconButton } from "../ui/IconButton";
 import { formatCount } from "../ui/scale";
 import { BakeProgress } from "./BakeProgress";
@@ -16,6 +18,8 @@ interface SceneCardProps {
   /** Called when the first bake is ready. */
   onReady: () => void;
 }
+
+const CLAY_WIDTH = 320;
 
 /** The scene's thumbnail; the server renders it on first request, which takes seconds. */
 function CardImage({ url }: { url: string }) {
@@ -40,7 +44,10 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onRead
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
         {scene.thumbnail === null ? (
-          <BakeProgress scene={scene} onReady={onReady} />
+          <>
+            <ClayImage url={clayUrl(scene.id, CLAY_WIDTH)} label="" isLazy />
+            <BakeProgress scene={scene} onReady={onReady} />
+          </>
         ) : (
           <CardImage url={scene.thumbnail} />
         )}

@@ -1,7 +1,8 @@
 /** The start page: import, built-in scenes, and the scenes as cards. */
-import { useCallback, useEffect, useState } from "preact/hooks";
-import { addGround, deleteScene, listScenes } from "../session/net/api";
+import { useCallback, useEffect, useRef, useState } from "preact/hooks";
+import { addGround, deleteScene, getScene, listScenes } from "../session/net/api";
 import type { SceneBody } from "../protocol";
+import type { SceneUpload } from "../session/net/upload";
 import type { BakeSettings } from "../session/scene/bakeSettings";
 import { openScene } from "../session/scene/openScene";
 import { reportErrors, showNote } from "../ui/toasts";
@@ -11,21 +12,51 @@ import { BakeDialog } from "./BakeDialog";
 import { ExampleScenes } from "./ExampleScenes";
 import { DropZone } from "./DropZone";
 import { SceneCard } from "./SceneCard";
+import type { ImportedScene } from "./useImport";
+import { isDisposable, type KnownScenes } from "./useReimport";
 
 function openInEditor(scene: SceneBody, choice?: BakeSettings): void {
   window.history.pushState(null, "", `?scene=${encodeURIComponent(scene.id)}`);
   void openScene(scene.id, undefined, choice);
 }
 
+/** A scene in the bake dialog. */
+interface BakeDialogState {
+  /** Number of the dialog: another one has a state of its own. */
+  number: number;
+  scene: SceneBody;
+  upload: SceneUpload | null;
+  /** Scenes of earlier imports. */
+  known: KnownScenes;
+}
+
+/** Delete a scene after an import of its file with other options, if nobody can miss it. */
+async function disposeReplaced(id: string, known: KnownScenes): Promise<void> {
+  if (isDisposable(await getScene(id), known)) await deleteScene(id);
+}
+
 export function StartPage() {
   const [scenes, setScenes] = useState<SceneBody[] | null>(null);
-  const [sceneToBake, setSceneToBake] = useState<SceneBody | null>(null);
+  const numDialogs = useRef(0);
+  const [dialog, setDialog] = useState<BakeDialogState | null>(null);
   const refresh = useCallback(() => void reportErrors(async () => setScenes(await listScenes())), []);
   useEffect(refresh, [refresh]);
-  const onImported = (importedScene: SceneBody[]) => {
-    if (importedScene.length === 1) setSceneToBake(importedScene[0] as SceneBody);
-    else showNote(`${importedScene.length} scenes imported.`);
+  const openDialog = (scene: SceneBody, upload: SceneUpload | null = null) => {
+    const known = scenes === null ? null : new Set(scenes.map(({ id }) => id));
+    numDialogs.current += 1;
+    setDialog({ number: numDialogs.current, scene, upload, known });
+  };
+  const onImported = (imported: ImportedScene[]) => {
+    const [only] = imported;
+    if (only !== undefined && imported.length === 1) openDialog(only.scene, only.upload);
+    else showNote(`${imported.length} scenes imported.`);
     refresh();
+  };
+  const onReplaced = ({ number, known }: BakeDialogState, scene: SceneBody, replaced: string) => {
+    setDialog((current) => (current?.number === number ? { ...current, scene } : current));
+    void reportErrors(() => (scene.id === replaced ? Promise.resolve() : disposeReplaced(replaced, known))).then(
+      refresh,
+    );
   };
   const confirmDelete = (scene: SceneBody) =>
     showNote(`Delete “${scene.name}” and its bakes? This can't be undone.`, {
@@ -34,7 +65,9 @@ export function StartPage() {
     });
   const createOnGround = async (scene: SceneBody) => {
     const grounded = await reportErrors(() => addGround(scene.id));
-    if (grounded !== undefined) onImported([grounded]);
+    if (grounded === undefined) return;
+    openDialog(grounded);
+    refresh();
   };
   return (
     <main class="start">
@@ -45,11 +78,14 @@ export function StartPage() {
       </header>
       <ReadOnly />
       {mayEdit.value && <DropZone onImported={onImported} />}
-      {sceneToBake !== null && (
+      {dialog !== null && (
         <BakeDialog
-          scene={sceneToBake}
-          onClose={() => setSceneToBake(null)}
-          onOpen={(choice) => openInEditor(sceneToBake, choice)}
+          key={dialog.number}
+          scene={dialog.scene}
+          upload={dialog.upload}
+          onReplaced={(scene, replaced) => onReplaced(dialog, scene, replaced)}
+          onClose={() => setDialog(null)}
+          onOpen={(choice) => openInEditor(dialog.scene, choice)}
         />
       )}
       {mayEdit.value && <ExampleScenes onOpen={openInEditor} />}
@@ -62,7 +98,7 @@ export function StartPage() {
             key={scene.id}
             scene={scene}
             onOpen={() => openInEditor(scene)}
-            onBake={() => setSceneToBake(scene)}
+            onBake={() => openDialog(scene)}
             onDelete={() => confirmDelete(scene)}
             onAddGround={() => void createOnGround(scene)}
             onReady={refresh}

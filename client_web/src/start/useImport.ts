@@ -1,8 +1,8 @@
 /** Imports the chosen scenes. */
 import { useState } from "preact/hooks";
 import { fileBaseName, type ImportSelection } from "./files/sceneFiles";
-import { uploadScene } from "../session/net/upload";
-import type { SceneBody } from "../protocol";
+import { uploadScene, type SceneUpload } from "../session/net/upload";
+import type { ImportOptions, SceneBody } from "../protocol";
 import { clearErrors, showError } from "../ui/toasts";
 
 export interface UploadState {
@@ -14,8 +14,14 @@ export interface UploadState {
   count: number;
 }
 
+/** An imported scene and its files. */
+export interface ImportedScene {
+  scene: SceneBody;
+  upload: SceneUpload;
+}
+
 interface ImportOutcome {
-  imported: SceneBody[];
+  imported: ImportedScene[];
   /** Paths of the scenes that were imported. */
   done: ReadonlySet<string>;
 }
@@ -26,7 +32,7 @@ interface SceneImport {
   problems: ReadonlyMap<string, string>;
   clearProblems: () => void;
   /** Import scenes sequentially; show errors. */
-  send: (selection: ImportSelection, ground: boolean) => Promise<ImportOutcome>;
+  send: (selection: ImportSelection, ground: boolean, options: ImportOptions) => Promise<ImportOutcome>;
 }
 
 function showRejected(problems: ReadonlyMap<string, string>, numSent: number): void {
@@ -42,18 +48,19 @@ function showRejected(problems: ReadonlyMap<string, string>, numSent: number): v
 export function useImport(): SceneImport {
   const [upload, setUpload] = useState<UploadState | null>(null);
   const [problems, setProblems] = useState<ReadonlyMap<string, string>>(new Map());
-  const send = async ({ scenes, environment }: ImportSelection, ground: boolean) => {
-    const imported: SceneBody[] = [];
+  const send = async ({ scenes, environment }: ImportSelection, ground: boolean, options: ImportOptions) => {
+    const imported: ImportedScene[] = [];
     const importedPaths = new Set<string>();
     const rejected = new Map<string, string>();
     clearErrors("files");
     for (const [k, scene] of scenes.entries()) {
       const name = fileBaseName(scene.path);
       try {
-        const order = { scene, companions: scene.companions, environment, name, ground };
+        const upload = { scene, companions: scene.companions, environment, name, ground, options };
         const uploadInfo = { name, number: k + 1, count: scenes.length };
         setUpload({ ...uploadInfo, fraction: 0 });
-        imported.push(await uploadScene(order, (fraction) => setUpload({ ...uploadInfo, fraction })));
+        const showProgress = (fraction: number) => setUpload({ ...uploadInfo, fraction });
+        imported.push({ scene: await uploadScene(upload, showProgress), upload });
         importedPaths.add(scene.path);
       } catch (error) {
         rejected.set(scene.path, (error as Error).message);

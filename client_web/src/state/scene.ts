@@ -5,6 +5,8 @@ import type { ModelBody, SceneBody, SceneMaterial, Term } from "../protocol";
 export const page = signal<"start" | "editor">("start");
 export const models = signal<ModelBody[]>([]);
 export const scene = signal<SceneBody | null>(null);
+/** Aspect ratio of the first bake of a scene that has none yet: clay pictures stand in for it. Null: there is a bake. */
+export const unbakedAspect = signal<number | null>(null);
 export const materialNames = computed(() => scene.value?.materials.map((m) => m.name) ?? []);
 
 /** The scene's info on a material. */

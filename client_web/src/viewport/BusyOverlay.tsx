@@ -1,9 +1,12 @@
-/** Progress shown before the first image. */
+/** Progress shown before the first image, over a clay picture if there is no bake yet. */
 import type { ViewImage } from "../render/viewImage";
 import { bakeProgressText, hasProgress, phaseText, useElapsedSeconds } from "../session/scene/bakeStatus";
+import { clayUrl } from "../session/net/api";
 import { bake, pendingBake } from "../state/bakes";
 import { connection, freezeStatus, rejectionMessage } from "../state/connection";
 import { displayedFrames } from "../state/display";
+import { scene, unbakedAspect } from "../state/scene";
+import { ClayImage } from "../ui/ClayImage";
 
 interface BusyMessage {
   text: string;
@@ -37,13 +40,30 @@ function busyMessage(view: string, elapsed: number): BusyMessage {
   return { text: text[connection.value], announced: text[connection.value], progress: null };
 }
 
+const CLAY_SIDE = 960;
+
+/** The shape of a scene without a bake. */
+function ClayPicture({ view }: { view: string }) {
+  const aspect = unbakedAspect.value;
+  if (scene.value === null || aspect === null) return null;
+  const width = Math.round(CLAY_SIDE * Math.min(1, aspect));
+  const url = clayUrl(scene.value.id, width, { name: view, height: Math.round(width / aspect) });
+  return (
+    <>
+      <ClayImage url={url} label={`Clay picture of ${view}`} />
+      <p>Clay picture: shape only. Materials and light come with the bake.</p>
+    </>
+  );
+}
+
 export function BusyOverlay({ image }: { image: ViewImage }) {
   void displayedFrames.value;
   const elapsed = useElapsedSeconds(pendingBake.value);
   if (image.hasPixels) return null;
   const { text, announced, progress } = busyMessage(image.view, elapsed);
   return (
-    <div class="waiting">
+    <div class={`waiting ${unbakedAspect.value === null ? "" : "over-clay"}`}>
+      <ClayPicture view={image.view} />
       <p>{text}</p>
       {progress !== null && <progress max={1} value={progress} aria-label={announced} />}
       <span class="announce" role="status">

@@ -268,7 +268,7 @@ def find_nondegenerate(
         warnings: gets a sentence if some have no area.
     """
     a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
-    edge = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)])
+    edge = np.maximum.reduce([np.einsum("nc,nc->n", side, side) for side in (b - a, c - a, c - b)])
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     has_area = np.asarray((area > 1e-10 * edge) & (edge > 0))
     if not has_area.all():

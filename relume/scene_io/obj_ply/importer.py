@@ -14,6 +14,7 @@ from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
+from relume.math.bounding_box import bounding_box
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize, no_triangles
 from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, TextureEncoding
@@ -30,7 +31,7 @@ from relume.scene_io.obj_ply.ply import Ply, read_ply
 from relume.scene_io.obj_ply.polygons import CutPolygons, triangulate
 from relume.scene_io.obj_ply.stl import read_stl
 from relume.scene_io.obj_ply.text import counted
-from relume.scene_io.obj_ply.weld import Corners, make_mesh
+from relume.scene_io.obj_ply.weld import Corners, make_mesh, used_rows
 from relume.scene_io.placement import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
 
@@ -289,8 +290,8 @@ def _recenter(positions: F64, vertices: I64, recenter: Recenter, warnings: list[
     """Positions relative to the new origin, and the origin: in double precision, before positions are rounded."""
     if vertices.size == 0:
         return positions, np.zeros(3)
-    used = positions[np.unique(vertices)]
-    origin = choose_origin(used.min(axis=0), used.max(axis=0), recenter)
+    used = used_rows(positions, vertices)
+    origin = choose_origin(*bounding_box(used), recenter)
     warnings.extend(moved_warning(origin))
     return (positions - origin if origin.any() else positions), origin
 

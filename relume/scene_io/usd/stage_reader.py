@@ -400,7 +400,7 @@ class _StageReader:
             primvar = candidates[other]
         uvs = np.column_stack([primvar.values[:, 0], 1 - primvar.values[:, 1]]).astype(np.float32)
         slot = replace(material.read_material.uv_slot, uv_set=0)
-        return slot.apply([uvs], len(uvs)).astype(np.float64), primvar.index
+        return slot.apply({0: uvs}, len(uvs)).astype(np.float64), primvar.index
 
     def _lights_and_cameras(self, lights: UsdLightReader, origin: F64) -> list[Camera]:
         from pxr import UsdGeom

@@ -192,6 +192,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=[SceneWarning.model_validate(warning.document()) for warning in record.warnings],
         import_options=ImportOptions.model_validate(record.import_options),
+        size=record.size,
         triangles=record.num_triangles,
         thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,
         bakes=[status.id for status in bakes],

@@ -37,7 +37,12 @@ class JpegResponse(Response):
 @router.get("")
 async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
     """Bounds of a scene; reads the scene, which may take seconds."""
-    viewport = await _open_viewport(scene, services)
+    viewport = await open_viewport(scene, services)
+    return await services.pictures.run(("bounds", scene), lambda: _body(viewport))
+
+
+def _body(viewport: PlacementViewport) -> ViewportBody:
+    """Describe it; finds a room first, which takes as long as reading the scene."""
     interior = viewport.interior_camera
     return ViewportBody(
         bounds_min=viewport.bounds_min.tolist(),
@@ -51,7 +56,7 @@ async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
 @router.post("", response_class=JpegResponse, name="draw_viewport")
 async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep) -> JpegResponse:
     """Image of a camera in plain colors."""
-    camera, viewport = view.custom_camera("finder").camera, await _open_viewport(scene, services)
+    camera, viewport = view.custom_camera("finder").camera, await open_viewport(scene, services)
 
     def encode_jpeg() -> bytes:
         file = io.BytesIO()
@@ -64,7 +69,7 @@ async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep)
 @router.post("/pick", name="pick_in_viewport")
 async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBody:
     """Surface point at a pixel of such an image."""
-    camera, viewport = pixel.custom_camera("finder").camera, await _open_viewport(scene, services)
+    camera, viewport = pixel.custom_camera("finder").camera, await open_viewport(scene, services)
     position = await run_in_threadpool(viewport.point_at, camera, pixel.size, pixel.x, pixel.y)
     return PickBody(position=None if position is None else position.tolist())
 
@@ -72,12 +77,13 @@ async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBo
 @router.post("/path", name="first_obstacle_in_viewport")
 async def first_obstacle(scene: Id, path: PathRequest, services: ServicesDep) -> PathBody:
     """First surface on a path, which stops a camera."""
-    viewport = await _open_viewport(scene, services)
+    viewport = await open_viewport(scene, services)
     length, material, normal = await run_in_threadpool(viewport.first_obstacle, path.points)
     return PathBody(length=length, material=material, normal=normal)
 
 
-async def _open_viewport(scene: str, services: Services) -> PlacementViewport:
+async def open_viewport(scene: str, services: Services) -> PlacementViewport:
+    """Read a scene, unless it was used recently. Raises NotFoundError."""
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     folder = scene_path(services.settings.data, record.id)
     return await services.pictures.run(("finder", folder), lambda: services.live.library.open_viewport(folder))

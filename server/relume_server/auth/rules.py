@@ -31,6 +31,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/scenes/{scene}": {"GET": VIEW, "DELETE": EDIT},
     "/api/scenes/{scene}/ground": {"POST": EDIT},
     "/api/scenes/{scene}/thumbnail.webp": {"GET": VIEW},
+    "/api/scenes/{scene}/clay.png": {"GET": VIEW},
     "/api/scenes/{scene}/cameras": {"GET": VIEW},
     "/api/scenes/{scene}/cameras/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
     "/api/scenes/{scene}/comments": {"GET": VIEW, "POST": EDIT},

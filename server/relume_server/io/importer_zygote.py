@@ -77,8 +77,10 @@ def _load() -> None:
     import relume.scene_io.import_scene
     import relume.scene_io.referenced_files  # noqa: F401
     import relume_worker.scenes  # noqa: F401
+    from relume.scene_io.obj_ply.weld import compile_kernels
     from relume_server.io.sandbox import missing_features
 
+    compile_kernels()  # in the sandbox, they could not be saved
     missing_features()
 
 

@@ -70,7 +70,8 @@ class SceneWarning(Body):
 class SceneBody(Body):
     """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
 
-    `warnings`: most severe first. `import_options`: for the next import of its file.
+    `warnings`: most severe first. `import_options`: for the next import of its file. `size`: sides of its bounding box
+    along x, y and z without a shadow catcher, meters; null for a scene of an older version.
     """
 
     id: str
@@ -82,6 +83,7 @@ class SceneBody(Body):
     variants: list[SceneVariant]
     warnings: list[SceneWarning]
     import_options: ImportOptions
+    size: tuple[float, float, float] | None
     triangles: int
     thumbnail: str | None
     bakes: list[str]

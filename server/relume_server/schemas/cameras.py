@@ -14,7 +14,8 @@ from relume_server.schemas.base import Body, Name
 MAX_PATH_POINTS = 64
 PathCoordinate = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 PathPoint = tuple[PathCoordinate, PathCoordinate, PathCoordinate]
-ViewportSide = Annotated[int, Field(ge=16, le=1024)]
+MIN_SIDE, MAX_SIDE = 16, 1024  # pixels
+ViewportSide = Annotated[int, Field(ge=MIN_SIDE, le=MAX_SIDE)]
 
 
 class CameraFrame(Body):

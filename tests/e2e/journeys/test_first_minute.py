@@ -77,7 +77,7 @@ def test_a_dropped_folder_becomes_a_scene_with_import_warnings_baked_in_any_shap
     expect(start.get_by_text("Scene: room.obj with 2 files")).to_be_visible()
     start.get_by_role("button", name="Import", exact=True).click()
     dialog = start.get_by_role("region", name="Bake room")
-    warnings = dialog.get_by_role("region", name="Looks different from the source file")
+    warnings = dialog.get_by_role("region", name="Differs from the file")
     expect(warnings).to_contain_text("Missing image “../images/gone.png” (map_Ks of material “Wall”)")
     expect(dialog.get_by_role("region", name="Ignored")).to_contain_text("lines aren't supported")
     own = dialog.get_by_role("group", name="Custom bake")

@@ -190,6 +190,12 @@ export async function deleteScene(id: string): Promise<void> {
   await request(`/api/scenes/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 
+/** Clay picture of a camera, by default the first; its height follows from the width and the camera. */
+export function clayUrl(scene: string, width: number, camera?: { name: string; height: number }): string {
+  const query = camera === undefined ? "" : `&camera=${encodeURIComponent(camera.name)}&height=${camera.height}`;
+  return `/api/scenes/${encodeURIComponent(scene)}/clay.png?width=${width}${query}`;
+}
+
 /** Create a copy of a scene with a ground plane. */
 export async function addGround(id: string): Promise<SceneBody> {
   return (await (

@@ -1,6 +1,14 @@
 /** Multipart uploads with progress, which fetch cannot report. */
 import type { DroppedFile } from "../../start/files/dropTypes";
-import type { BtfJobBody, EnvironmentBody, ImageBody, ImportedBody, MeasuredBody, SceneBody } from "../../protocol";
+import type {
+  BtfJobBody,
+  EnvironmentBody,
+  ImageBody,
+  ImportedBody,
+  ImportOptions,
+  MeasuredBody,
+  SceneBody,
+} from "../../protocol";
 import { ApiError } from "./api";
 
 export interface SceneUpload {
@@ -10,6 +18,7 @@ export interface SceneUpload {
   environment: File | null;
   name: string;
   ground: boolean;
+  options: ImportOptions;
 }
 
 function parseResponse(request: XMLHttpRequest): unknown {
@@ -41,6 +50,7 @@ export function uploadScene(upload: SceneUpload, progress: (fraction: number) =>
   if (upload.environment !== null) form.append("environment", upload.environment);
   form.append("name", upload.name);
   form.append("ground", String(upload.ground));
+  for (const [option, value] of Object.entries({ ...upload.options })) form.append(option, value);
   return postForm("/api/scenes", form, progress) as Promise<SceneBody>;
 }
 

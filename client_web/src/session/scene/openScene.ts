@@ -13,7 +13,7 @@ import { axes, bake, bakes, pendingBake, method } from "../../state/bakes";
 import { connection, freezeStatus } from "../../state/connection";
 import { fidelity, isOutdated } from "../../state/fidelity";
 import { defaultLook, look } from "../../state/look";
-import { models, page, scene } from "../../state/scene";
+import { models, page, scene, unbakedAspect } from "../../state/scene";
 import { selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../../state/selection";
 import { joinState, members, selfNumber, type JoinState } from "../../state/collaboration";
 import { availableViews, hoveredView, shownViews, activeViewName } from "../../state/views";
@@ -33,6 +33,7 @@ function resetEditor(newScene: SceneBody): void {
   history.clear();
   previewedStep.value = null;
   scene.value = newScene;
+  unbakedAspect.value = null;
   look.value = defaultLook.value = null;
   bake.value = pendingBake.value = method.value = null;
   axes.value = [];
@@ -112,6 +113,12 @@ export async function openScene(
   });
 }
 
+/** Aspect ratio of a bake's images. */
+function aspectOf({ views }: SceneBody, { size, aspect, views: [first] }: BakeSettings): number | null {
+  if (size !== undefined) return size[0] / size[1];
+  return aspect ?? views.find(({ name }) => name === first)?.aspect ?? null;
+}
+
 /** Show the bake of this id, else the finest; start one if there is none or settings were chosen. */
 async function openBestBake(
   openedScene: SceneBody,
@@ -122,6 +129,7 @@ async function openBestBake(
   const bestBake = ready.find((each) => each.id === id) ?? ready[0];
   const running = bakes.peek().find((each) => each.state === "running" || each.state === "queued");
   const settings = choice ?? { method: DEFAULT_BAKE_METHOD, preset: "good", views: viewsToBake(openedScene) };
+  if (bestBake === undefined) unbakedAspect.value = aspectOf(openedScene, settings);
   openBake(bestBake?.id ?? (await bakePreview(openedScene, settings)));
   if (choice === undefined && running !== undefined) trackBake(running);
   else if (choice !== undefined || bestBake === undefined) await startFullBake(openedScene, settings);

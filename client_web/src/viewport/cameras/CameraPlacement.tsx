@@ -1,6 +1,7 @@
 /** The camera placement viewport: navigate the scene in plain colors, then save the camera. */
 import { useEffect, useId, useRef, useState } from "preact/hooks";
 import type { SceneBody, Triple } from "../../protocol";
+import { LatestRequest } from "../../session/net/latestRequest";
 import type { BakeSize } from "../../session/scene/recipe";
 import { IconButton } from "../../ui/IconButton";
 import {
@@ -16,7 +17,6 @@ import { saveCameraAs } from "./savedCameras";
 import { CameraMotion } from "./cameraMotion";
 import { poseOf, orbitOf, type Bounds, type CameraPose, type Orbit } from "./orbit";
 import { LensSliders, StopAtWalls } from "./LensFields";
-import { PlacementImages } from "./placementImages";
 import { CAMERA_STEPS, NAVIGATION_HELP, NAVIGATION_LABELS } from "./cameraSteps";
 import { navigation, stopsAtWalls, toggleNavigation, wallMargin } from "./navigation";
 import { cameraKeyStep, useCameraControl } from "./useCameraControl";
@@ -106,8 +106,8 @@ function usePlacementCamera(
   const [wall, setWall] = useState<string | null>(null);
   const pipeline = useRef<{ motion: CameraMotion; guard: WallGuard } | null>(null);
   useEffect(() => {
-    const images = new PlacementImages(
-      (frame, size) => renderPlacement(scene, frame, size),
+    const images = new LatestRequest(
+      ({ frame, size }: { frame: CameraPose; size: BakeSize }) => renderPlacement(scene, frame, size),
       async (blob) => {
         const bitmap = await createImageBitmap(blob);
         if (canvas.current !== null) {
@@ -121,7 +121,7 @@ function usePlacementCamera(
       (error) => fail(error instanceof Error ? error.message : String(error)),
     );
     const motion = new CameraMotion(first, (displayed, isLast) =>
-      images.show(poseOf(displayed), isLast ? IDLE_SIZE : MOVING_SIZE),
+      images.send({ frame: poseOf(displayed), size: isLast ? IDLE_SIZE : MOVING_SIZE }),
     );
     const guard = new WallGuard(wallMargin(bounds), {
       now: () => motion.target,
@@ -134,7 +134,7 @@ function usePlacementCamera(
       trace: (points) => tracePlacementPath(scene, points),
     });
     pipeline.current = { motion, guard };
-    images.show(poseOf(first), IDLE_SIZE);
+    images.send({ frame: poseOf(first), size: IDLE_SIZE });
     return () => {
       guard.cancel();
       motion.end();
