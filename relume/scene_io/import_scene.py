@@ -19,7 +19,6 @@ from relume.scene_io.usd import import_usd
 from relume.scene_io.zip_scene import open_zip
 
 MAX_FILE_BYTES = 512 << 20
-_MAX_PACKAGES = 2  # a .zip file may contain a .usdz file, which is one, too
 OBJ_LINE = re.compile(rb"(?:^|\r|\xef\xbb\xbf)[ \t]*(v|vn|vt|f|o|g|usemtl|mtllib)[ \t]", re.MULTILINE)
 
 
@@ -47,9 +46,8 @@ def import_scene(
         raise SceneError("the scene file is empty: 0 bytes; export or download it again")
     if companions is None:
         companions = NoFiles() if isinstance(source, bytes) else Folder(Path(source).parent)
-    for _ in range(_MAX_PACKAGES):
-        if data.startswith(b"PK"):
-            data, companions = open_zip(data)
+    if data.startswith(b"PK"):
+        data, companions = open_zip(data)
     options = options or ImportOptions()
     return place(_read(data, name, environment, companions, options), options)
 

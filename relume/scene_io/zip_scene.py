@@ -19,11 +19,14 @@ _USDZ_ALIGNMENT = 64  # bytes; of the content of each entry of a .usdz file
 TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack only what the scene needs"
 
 
-def open_zip(data: bytes, suffixes: tuple[str, ...] = SCENE_SUFFIXES, kind: str = "scene") -> tuple[bytes, Archive]:
+def open_zip(
+    data: bytes, suffixes: tuple[str, ...] = SCENE_SUFFIXES, kind: str = "scene", *, opens_packages: bool = True
+) -> tuple[bytes, Archive]:
     """Open the scene file in an archive, and its companions.
 
     Args:
         data: the archive. suffixes: of the file that names the others. kind: names that file in messages.
+        opens_packages: a scene file that is a .usdz package, which is an archive too, is opened in its turn.
     Raises:
         SceneError: the archive is damaged, encrypted, too large, or does not contain exactly one scene file.
     """
@@ -38,8 +41,10 @@ def open_zip(data: bytes, suffixes: tuple[str, ...] = SCENE_SUFFIXES, kind: str 
     entries = [entry for entry in archive.infolist() if not entry.is_dir() and not _is_litter(entry.filename)]
     _check_entries(entries)
     scene = _find_document(data, entries, archive, suffixes, kind)
-    folder = posixpath.dirname(scene.filename.replace("\\", "/"))
-    return read_entry(archive, scene), Archive(archive, folder)
+    document = read_entry(archive, scene)
+    if opens_packages and scene.filename.lower().endswith(".usdz"):
+        return open_zip(document, opens_packages=False)
+    return document, Archive(archive, posixpath.dirname(scene.filename.replace("\\", "/")))
 
 
 def _find_document(
