@@ -87,7 +87,7 @@ def test_a_camera_on_a_tilted_surface_far_from_the_origin_leaves_it_and_meets_th
     corners = np.array([[-5, 1, -5], [5, 2, -5], [5, 3, 5], [-5, 2, 5]], float)  # a parallelogram
     floor, ceiling = (quad("plane", at + corners + [0, y, 0], 0) for y in (0, 4))
     start = floor.positions.astype(float).mean(axis=0)
-    surface = obstacle(path(start, start + [0, 9, 0]), floor, ceiling)
+    surface = obstacle(np.stack([start, start + np.array([0, 9, 0])]), floor, ceiling)
     assert surface.length == pytest.approx(4, abs=0.1)
 
 
