@@ -30,7 +30,7 @@ from relume.lights.light_sampling import (
     subdivide_emitter,
 )
 from relume.look import LightGeometry
-from relume.raytrace.ray_origins import end_offsets
+from relume.math.plane_rounding import end_offsets
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -53,7 +53,7 @@ class LocalLight(NamedTuple):
         position: position of point lights. axis: unit axis of spots; direction of travel of directional light.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
         corner, edges, normal: corner, edges and normals of parallelograms or triangles; unit normals.
-        end_offset: of ray ends from the pieces, see `relume.raytrace.ray_origins.end_offsets`.
+        end_offset: of ray ends from the pieces, see `relume.math.plane_rounding.end_offsets`.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
         is_rectangle: a parallelogram, else triangles. is_two_sided: emits to both sides.
     """

@@ -1,15 +1,7 @@
 """Ray origins on triangles: off their plane by a bound of rounding, and off their edges.
 
-Let ε = 2⁻²⁴, n the unit normal of a triangle with edges e₁, e₂ and a box of size s, and m the largest |coordinate| of
-its corners along each axis. Embree finds the side of the plane on which an origin o lies by the sign of a determinant,
-det(e₁, e₂, v − o). It is moved by the rounding of corners and origins, ε Σ |nᵢ| mᵢ, and by that of the determinant,
-ε perm(|e₁|, |e₂|, s) / |e₁ × e₂| (Shewchuk 1997). The offset
-
-    h = ε (4 Σ |nᵢ| mᵢ + 2 perm(|e₁|, |e₂|, s) / |e₁ × e₂| + max s)
-
-exceeds both, so that no ray that leaves the plane meets its triangle. It grows with the triangle and its distance from
-the world's origin, and not with the scene. In a plane x, y or z = 0 only the last summand remains. Triangles that share
-a vertex have the largest of their offsets, because they may share a plane too.
+Triangles that share a vertex have the largest of their offsets (`relume.math.plane_rounding`), because a large and a
+small one may lie in one plane.
 """
 
 from __future__ import annotations
@@ -23,54 +15,14 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
+from relume.math.plane_rounding import ROUNDING, origin_offsets
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_EPSILON = 2.0**-24  # rounding of float32
-_POSITIONS, _DETERMINANT, _EXTENT = 4.0, 2.0, 1.0  # factors of the summands; twice those without a false hit
-_MAX_ASPECT = 512.0  # of slivers: their offset would exceed their height
-_EDGE = 8.0  # ε: rounding of barycentric coordinates, times the size of the triangle
+_EDGE = 8.0  # roundings of barycentric coordinates, times the size of the triangle
 _ROWS_PER_RANGE = 16_384
 _TINY = 1e-300
-
-
-class _Determinants(NamedTuple):
-    """Triangles as determinants: unit normals, extents, and permanents per extent over |e₁ × e₂| along each axis."""
-
-    normal: Shaped[F64, "n 3"]
-    extent: Shaped[F64, "n 3"]
-    condition: Shaped[F64, "n 3"]
-
-    @classmethod
-    def of(cls, corners: Shaped[NDArray[np.floating], "n 3 3"]) -> Self:
-        p = corners.astype(np.float64)
-        first, second = np.abs(p[:, 1] - p[:, 0]), np.abs(p[:, 2] - p[:, 0])
-        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-        length = np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _TINY)
-        permanent = np.roll(first, -1, 1) * np.roll(second, -2, 1) + np.roll(first, -2, 1) * np.roll(second, -1, 1)
-        return cls(normal / length, np.ptp(p, axis=1), np.minimum(permanent / length, _MAX_ASPECT))
-
-
-def origin_offsets(corners: Shaped[NDArray[np.floating], "n 3 3"]) -> Shaped[F32, " n"]:
-    """Offsets h of ray origins from the planes of triangles, meters. corners: positions, meters"""
-    triangles = _Determinants.of(corners)
-    rounding = _POSITIONS * (np.abs(triangles.normal) * np.abs(corners).max(axis=1)).sum(axis=1)
-    rounding += _DETERMINANT * (triangles.condition * triangles.extent).sum(axis=1)
-    return np.asarray(_EPSILON * (rounding + _EXTENT * triangles.extent.max(axis=1)), np.float32)
-
-
-def end_offsets(corners: Shaped[NDArray[np.floating], "n 3 3"]) -> Shaped[F32, "n 2"]:
-    """Offsets of ray ends from the planes of triangles: h, and what is added per meter of the ray's length.
-
-    From afar, the extent in the determinant's rounding is that of the ray.
-
-    Args:
-        corners: positions, meters.
-    """
-    condition = _Determinants.of(corners).condition.sum(axis=1)
-    per_meter = _EPSILON * (_POSITIONS + _DETERMINANT * condition)
-    return np.stack([origin_offsets(corners), per_meter], axis=1).astype(np.float32)
 
 
 class OriginMesh(NamedTuple):
@@ -97,7 +49,11 @@ class OriginMesh(NamedTuple):
         faces: Shaped[NDArray[np.uint32], "faces 3"],
         normal: Shaped[F32, "faces 3"],
     ) -> Self:
-        """Compute the offsets."""
+        """Compute the offsets.
+
+        Args:
+            positions: of the vertices, meters. faces: vertex indices. normal: unit normals of the faces.
+        """
         offset, margin = np.empty(len(faces), np.float32), np.empty((len(faces), 3), np.float32)
 
         def compute(start: int, stop: int) -> None:
@@ -120,7 +76,7 @@ def _margins(corners: Shaped[F64, "n 3 3"]) -> Shaped[F32, "n 3"]:
     """Least barycentric coordinates: rounding of the position in the triangle, at most a tenth of its height."""
     edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners[:, [2, 0, 1]], axis=2)  # opposite to each corner
     twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    distance = _EDGE * _EPSILON * (np.abs(corners).max(axis=(1, 2)) + np.ptp(corners, axis=1).max(axis=1))
+    distance = _EDGE * ROUNDING * (np.abs(corners).max(axis=(1, 2)) + np.ptp(corners, axis=1).max(axis=1))
     height = twice_area[:, None] / np.maximum(edges, _TINY)
     return np.asarray(np.minimum(distance[:, None] / np.maximum(height, _TINY), 0.1), np.float32)
 
@@ -142,7 +98,11 @@ def _raise_to_neighbors(faces, largest, offset):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def inner_barycentrics(mesh, face, u, v):  # type: ignore[no-untyped-def]
-    """Move barycentric coordinates (u, v) of the second and third corner off the edges; return those of all three."""
+    """Move barycentric coordinates off the edges; return those of all three corners.
+
+    Args:
+        mesh: `OriginMesh`. face: the triangle. u, v: of its second and third corner.
+    """
     a = max(np.float64(1) - u - v, np.float64(mesh.margin[face, 0]))
     b, c = max(np.float64(u), np.float64(mesh.margin[face, 1])), max(np.float64(v), np.float64(mesh.margin[face, 2]))
     total = a + b + c

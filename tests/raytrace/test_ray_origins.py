@@ -6,16 +6,15 @@ from tiny_scenes import mesh, quad
 
 from relume.lights.local_lights import make_light_strata, prepare_local_lights
 from relume.look import LightGeometry
+from relume.math.plane_rounding import ROUNDING, origin_offsets
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.local_light_visibility import trace_light_visibility
-from relume.raytrace.ray_origins import OriginMesh, origin_offsets, ray_origins
+from relume.raytrace.ray_origins import OriginMesh, ray_origins
 from relume.raytrace.scene_buffers import face_normals
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import any_tangent
 from relume.scene.merge_meshes import merge_meshes
-
-ROUNDING = 2.0**-24  # of float32
 
 
 def rays_from(positions, faces, num, rng):

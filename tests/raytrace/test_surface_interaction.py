@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
 
+from relume.math.plane_rounding import ROUNDING
 from relume.raytrace.camera_rays import Hits
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.surface_interaction import surface_at
 
-ROUNDING = 2.0**-24  # of float32
 INWARD = np.array([[-1.0, 0.0, 0.0]], np.float32)  # along the ray that hits the wall
 
 

@@ -27,9 +27,9 @@ from relume.live.free_camera.lobe_coverage import lobe_coverage, nearest_point
 from relume.live.free_camera.normal_mapping import normalize
 from relume.look.model import Rgb
 from relume.math.fast_math import acos_clamped
+from relume.math.plane_rounding import end_offsets
 from relume.raytrace.lobe_directions import LobePattern, angle_at_quantile, lobe_density, lobe_direction, ray_jitter
 from relume.raytrace.local_light_visibility import shadow_ray
-from relume.raytrace.ray_origins import end_offsets
 from relume.raytrace.ray_packet import (
     LANES,
     enable_lane,
@@ -64,7 +64,7 @@ class LobeEmitter(NamedTuple):
     Attributes:
         light, strata: the light, with one sample if it has no surface.
         triangles: of its surface, meters; empty for none. normal: unit, of each.
-        end_offset: of ray ends from each, see `relume.raytrace.ray_origins.end_offsets`.
+        end_offset: of ray ends from each, see `relume.math.plane_rounding.end_offsets`.
         radiance: relative to the emission.
         center, radius: of a sphere around the triangles, meters.
     """
