@@ -107,7 +107,7 @@ def irradiance(geometry, light, position, normal, triangles=None, num_samples=64
     made = prepare_local_lights(light, triangles)
     strata = make_light_strata(made, num_samples)
     points = make_surface_points(position, normal)
-    return compute_irradiance(made, strata, points, trace_light_visibility(geometry, 1e-5, made, strata, points))
+    return compute_irradiance(made, strata, points, trace_light_visibility(geometry, made, strata, points))
 
 
 def embree_of(*meshes):
