@@ -24,6 +24,7 @@ from relume.look import validate
 from relume.methods.patch_layout import read_tree
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import NO_PATCH, PatchTree
+from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
@@ -95,13 +96,12 @@ def _without_the_worst(estimate: F64, reference: F64) -> float:
 def _areas(geometry: SceneBuffers, tree: PatchTree, num_patches: int, num_samples: int) -> F64:
     """Areas of all patches, m². (C,)"""
     rng = np.random.default_rng(_SEED)
-    a, b, c = geometry.positions[geometry.faces].astype(np.float64).transpose(1, 0, 2)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    area = geometry.face_areas
     face = rng.choice(len(area), num_samples, p=area / area.sum())
     u, v = rng.random((2, num_samples))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     normal = geometry.face_normals[face]
-    position = a[face] + u[:, None] * (b - a)[face] + v[:, None] * (c - a)[face] + geometry.epsilon * normal
+    position = positions_on_faces(geometry, face, np.stack([u, v], axis=1).astype(np.float32), normal)
     keys, node = np.concatenate([position, normal], axis=1), tree.roots[2 * geometry.face_mesh[face]].astype(np.int64)
     while np.any(inner := (node >= 0) & (node < len(tree.axis))):
         sample_index = node[inner]

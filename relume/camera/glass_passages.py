@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.camera.refraction import MAX_GLASS_HITS
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
+from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import camera_directions, near_distances, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Camera
@@ -64,6 +65,6 @@ def trace_passages(geometry: SceneBuffers, camera: Camera, size: tuple[int, int]
         passes = np.isin(material, glass)
         if not passes.any():
             break
-        ahead = (hits.distance[passes] + 2 * geometry.epsilon)[:, None]
-        origins, ray = origins[passes] + ahead * directions[ray[passes]], ray[passes]
+        ray = ray[passes]
+        origins = positions_on_faces(geometry, hits.face[passes], hits.uv[passes], directions[ray])
     return GlassPassages(num_surfaces, length)

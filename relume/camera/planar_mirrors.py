@@ -30,7 +30,7 @@ F64 = NDArray[np.float64]
 MAX_PLANES = 4  # per scene
 _MIN_FLAT_COSINE = 0.9999  # the least cosine between a face and the normals at its corners
 _MIN_RELATIVE_AREA = 1e-4  # of the squared diagonal of the scene
-_PLANE_TOLERANCE = 8  # times the ray offset: points within this distance lie in a plane
+_PLANE_TOLERANCE, _ROUNDING = 1e-4, 2.0**-20  # of the mirrors' extent, and of the largest coordinate
 _RAYS_PER_BATCH = 1 << 18
 
 
@@ -54,22 +54,27 @@ class PlanarMirrors(NamedTuple):
         """Number of planes P."""
         return len(self.offset)
 
+    @property
+    def tolerance(self) -> Shaped[F64, " P"]:
+        """Distance from each plane within which points lie in it, meters."""
+        extent = (self.high - self.low).max(axis=1).astype(np.float64)
+        largest = np.abs(np.concatenate([self.offset[:, None], self.low, self.high], axis=1)).max(axis=1)
+        return np.asarray(_PLANE_TOLERANCE * extent + _ROUNDING * largest)
+
     def distance_to_plane(self, plane: NDArray[np.integer] | int, position: NDArray[np.floating]) -> F64:
         """Distance of positions (…, 3) from a plane, or each from its own plane."""
         normal = self.normal[plane].astype(np.float64)
         return np.asarray(np.abs((position * normal).sum(axis=-1) - self.offset[plane]), np.float64)
 
-    def containing_plane(
-        self, position: Shaped[F32, "patches points 3"], epsilon: float
-    ) -> Shaped[NDArray[np.uint8], " patches"]:
+    def containing_plane(self, position: Shaped[F32, "patches points 3"]) -> Shaped[NDArray[np.uint8], " patches"]:
         """Index of the plane that contains each patch, 255 if there is none.
 
         Args:
-            position: sample points of the patches, off the surface by about `epsilon`.
+            position: sample points of the patches, as origins of rays.
         """
         plane_index = np.full(len(position), 255, np.uint8)
         for p in reversed(range(self.num_planes)):
-            coordinates, tolerance = position @ self.axes[p].T.astype(np.float64), _PLANE_TOLERANCE * epsilon
+            coordinates, tolerance = position @ self.axes[p].T.astype(np.float64), self.tolerance[p]
             inside = (coordinates >= self.low[p] - tolerance) & (coordinates <= self.high[p] + tolerance)
             plane_index[(self.distance_to_plane(p, position) < tolerance).all(axis=1) & inside.all(axis=(1, 2))] = p
         return plane_index
@@ -108,7 +113,7 @@ def find_planar_mirrors(scene: Scene, geometry: SceneBuffers) -> PlanarMirrors:
         is_coplanar = (
             (face_material == face_material[seed])
             & ~is_tilted
-            & (plane.distance_to_plane(0, corner_positions) < _PLANE_TOLERANCE * geometry.epsilon).all(axis=1)
+            & (plane.distance_to_plane(0, corner_positions) < plane.tolerance[0]).all(axis=1)
         )
         coordinates = corner_positions[is_coplanar].reshape(-1, 3) @ plane.axes[0].T
         planes.append(plane._replace(low=coordinates.min(axis=0)[None], high=coordinates.max(axis=0)[None]))
@@ -128,7 +133,7 @@ def _group_by_plane(
     """Group triangles that lie roughly in one plane, the largest area first, down to `min_area`."""
     sign = np.where(normal @ np.array([1.0, 1e-2, 1e-4]) < 0, -1, 1)  # a plane has two sides
     offset = sign * np.einsum("fc,fc->f", corner_positions.mean(axis=1), normal)
-    size = max(float(np.abs(corner_positions).max(initial=0)), 1e-9)
+    size = max(float(np.abs(corner_positions).max(initial=0)), 1e-30)
     keys = [material, *np.rint(500 * sign * normal.T), np.rint(2000 / size * offset)]
     _, group = np.unique(np.stack(keys, axis=1), axis=0, return_inverse=True)
     total = np.bincount(group.ravel(), area)
@@ -139,11 +144,13 @@ def _group_by_plane(
 
 
 def _plane_of_triangle(normal: F32, corners: F64, material: int) -> PlanarMirrors:
-    """Make the plane of one triangle, without extent. normal: (3,). corners: (3, 3)"""
+    """Make the plane of one triangle. normal: (3,). corners: (3, 3)"""
     unit_normal = normal.astype(np.float64) / np.linalg.norm(normal.astype(np.float64))
     tangent = any_tangent(unit_normal[None])[0].astype(np.float64)
     axes, offset = np.stack([tangent, np.cross(unit_normal, tangent)])[None], np.array([(corners @ unit_normal).mean()])
-    return PlanarMirrors(unit_normal[None], offset, np.array([material]), axes, *np.empty((2, 1, 2), np.float32))
+    coordinates = corners @ axes[0].T
+    low, high = coordinates.min(axis=0)[None], coordinates.max(axis=0)[None]
+    return PlanarMirrors(unit_normal[None], offset, np.array([material]), axes, low, high)
 
 
 def mirrored_lights(normal: Shaped[F32, "P 3"], directions: Shaped[F32, "T 3"]) -> Shaped[F32, "P T 3"]:
@@ -230,8 +237,7 @@ def _trace_mirror_paths(
     mirror_position = points.position[rows] + hits.distance[rows, None].astype(np.float64) * to_mirror[rows]
     is_same_material = geometry.face_material[hits.face[rows]] == mirrors.material[plane[rows]]
     rows = rows[
-        is_same_material
-        & (mirrors.distance_to_plane(plane[rows], mirror_position) < _PLANE_TOLERANCE * geometry.epsilon)
+        is_same_material & (mirrors.distance_to_plane(plane[rows], mirror_position) < mirrors.tolerance[plane[rows]])
     ]
     is_unoccluded = np.zeros(len(to_mirror), np.bool_)
     mirror_hits, to_light = hits.rows(rows), directions[light_index[rows]]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.fresnel import fresnel
 from relume.camera.ray_paths import RayPaths
+from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import Hits
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_interaction import surface_at
@@ -95,7 +96,7 @@ def refract(
     """
     glass_hits = hits.rows(rows)
     material, directions = geometry.face_material[glass_hits.face], paths.directions[rows].astype(np.float64)
-    points = surface_at(geometry, glass_hits, paths.directions[rows]).points  # offset toward the visible side
+    points = surface_at(geometry, glass_hits, paths.directions[rows]).points
     face_normal, normal = geometry.face_normals[glass_hits.face].astype(np.float64), points.normal.astype(np.float64)
     facing = np.einsum("nc,nc->n", face_normal, directions)
     is_solid = glass.is_solid[material]
@@ -123,10 +124,10 @@ def refract(
         transmittance *= np.where(alpha > 0, unshadowed_fraction(side, alpha), 1)[:, None]
     path_key = paths.path_key[rows]
     path_key = np.where(alpha > 0, path_key + ((1 + paths.ray[rows] % _MAX_RAYS_PER_PIXEL) << _KEY_BITS), path_key)
-    offset = np.where(is_total_reflection, 0, 2 * geometry.epsilon * np.sign(facing))[:, None] * face_normal
+    toward = np.where(is_total_reflection, -1, 1)[:, None] * directions
     continued = RayPaths(
         paths.ray[rows],
-        (points.position + offset).astype(np.float32),
+        positions_on_faces(geometry, glass_hits.face, glass_hits.uv, toward),
         new_directions.astype(np.float32),
         (paths.transmittance[rows] * transmittance).astype(np.float32),
         paths.length[rows] + glass_hits.distance,

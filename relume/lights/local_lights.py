@@ -30,12 +30,13 @@ from relume.lights.light_sampling import (
     subdivide_emitter,
 )
 from relume.look import LightGeometry
+from relume.math.plane_rounding import end_offsets
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 POINT, DIRECTIONAL, SURFACE = 0, 1, 2
-MIN_DISTANCE = np.float32(1e-3)  # meters, clamps the falloff of point lights
+_MIN_DISTANCE = np.float32(1e-12)  # meters, from point lights: so that the falloff is finite
 _INFINITE = np.float32(np.inf)
 _SEED = 1
 _SAMPLE_FACTORS = {"rectangle": 1, "mesh": 4}  # most samples of a mesh face away from a point, or are far from it
@@ -52,6 +53,7 @@ class LocalLight(NamedTuple):
         position: position of point lights. axis: unit axis of spots; direction of travel of directional light.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
         corner, edges, normal: corner, edges and normals of parallelograms or triangles; unit normals.
+        end_offset: of ray ends from the pieces, see `relume.math.plane_rounding.end_offsets`.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
         is_rectangle: a parallelogram, else triangles. is_two_sided: emits to both sides.
     """
@@ -64,6 +66,7 @@ class LocalLight(NamedTuple):
     corner: Shaped[F32, "T 3"]
     edges: Shaped[F32, "T 2 3"]
     normal: Shaped[F32, "T 3"]
+    end_offset: Shaped[F32, "T 2"]
     power_cdf: Shaped[F32, " T"]
     area: np.float32
     is_rectangle: bool
@@ -122,6 +125,7 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
         corner=corner[pieces].astype(np.float32),
         edges=edges[pieces].astype(np.float32),
         normal=piece_normals.astype(np.float32),
+        end_offset=end_offsets(np.concatenate([corner[:, None], corner[:, None] + edges], axis=1)[pieces]),
         power_cdf=(np.cumsum(areas[pieces]) / max(area, 1e-300)).astype(np.float32),
         area=np.float32(area),
         is_rectangle=is_rectangle,
@@ -184,23 +188,22 @@ def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: 
         shift_u, shift_v: the point's shift within the strata, from `cranley_patterson_offset`. px, py, pz: the point,
             meters.
     Returns:
-        Unit direction toward the sample (three), distance, w, and the surface normal on the point's side (three; zeros
-        if it has no surface).
+        Unit direction toward the sample (three), distance, w, the surface normal on the point's side (three; zeros if
+        it has no surface), and the offset of a ray's end from the surface, meters.
     """
     zero, unity = np.float32(0), np.float32(1)
     if light.kind == DIRECTIONAL:
-        return -light.axis[0], -light.axis[1], -light.axis[2], _INFINITE, unity, zero, zero, zero
+        return -light.axis[0], -light.axis[1], -light.axis[2], _INFINITE, unity, zero, zero, zero, zero
     if light.kind == POINT:
         dx, dy, dz = light.position[0] - px, light.position[1] - py, light.position[2] - pz
-        distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), np.float32(1e-20))
+        distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), _MIN_DISTANCE)
         inverse_distance = unity / distance
         dx, dy, dz = dx * inverse_distance, dy * inverse_distance, dz * inverse_distance
         along = -(dx * light.axis[0] + dy * light.axis[1] + dz * light.axis[2])
         falloff = min(max(light.cone_scale * along + light.cone_offset, zero), unity)
-        clamped_distance = max(distance, MIN_DISTANCE)
-        return dx, dy, dz, distance, falloff * falloff / (clamped_distance * clamped_distance), zero, zero, zero
+        return dx, dy, dz, distance, falloff * falloff / (distance * distance), zero, zero, zero, zero
     if light.area == 0:
-        return unity, zero, zero, unity, zero, zero, zero, zero
+        return unity, zero, zero, unity, zero, zero, zero, zero, zero
     u, v = strata.uv[sample, 0] + shift_u, strata.uv[sample, 1] + shift_v
     u = strata.corner[sample, 0] + strata.size[0] * (u - np.float32(u >= unity))
     v = strata.corner[sample, 1] + strata.size[1] * (v - np.float32(v >= unity))
@@ -224,4 +227,5 @@ def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: 
     area = light.area / np.float32(strata.uv.shape[0])
     # a sample's area at a distance below its width fills the half space: w is clamped
     weight = area * max(cosine, zero) / max(distance * distance, area / _PI)
-    return dx, dy, dz, distance, weight, nx, ny, nz
+    lift = light.end_offset[piece, 0] + light.end_offset[piece, 1] * distance
+    return dx, dy, dz, distance, weight, nx, ny, nz, lift

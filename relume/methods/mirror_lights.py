@@ -98,7 +98,7 @@ def make_mirror_lights(
         return {}
     mirrors = find_planar_mirrors(scene, geometry)
     mirror_lights = MirrorLights.from_lights(
-        read_lights(store), read_tiles(store), mirrors, mirrors.containing_plane(patch_positions, geometry.epsilon)
+        read_lights(store), read_tiles(store), mirrors, mirrors.containing_plane(patch_positions)
     )
     return mirror_lights.arrays if mirror_lights.num_mirrored_lights else {}
 

@@ -137,7 +137,7 @@ class Viewport:
         Args:
             path: corners of a polyline, meters.
         """
-        obstacle = first_obstacle(self.geometry.embree, np.array(path, np.float64), self.geometry.epsilon)
+        obstacle = first_obstacle(self.geometry.embree, self.geometry.origins, np.array(path, np.float64))
         if obstacle is None:
             return None, None, None
         x, y, z = self.geometry.face_normals[obstacle.face].tolist()

@@ -14,7 +14,7 @@ from relume.core.errors import ChunkDamagedError
 from relume.probes.lattice_nodes import LatticeNodes
 from relume.probes.triangle_grids import ProbeGrid, num_nodes
 from relume.raytrace.gather_rays import RayPattern, make_pattern
-from relume.raytrace.scene_buffers import SceneBuffers
+from relume.raytrace.scene_buffers import SceneBuffers, face_normals
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.surface_textures import NORMAL_MAP, Textures, read_textures, texture_coordinates
 from relume.scene.model import Scene
@@ -173,9 +173,5 @@ def _read_faces(store: StoreReader) -> tuple[F32, F32, NDArray[np.uint32], NDArr
     tangents = store.read("scene/tangents").astype(np.float32)
     if int(faces.max(initial=0)) >= min(len(positions), len(uvs)):
         raise ChunkDamagedError("scene/faces", "a triangle has a corner that the scene has not")
-    a, b, c = positions[faces].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    twice_area = np.maximum(np.linalg.norm(normal, axis=1), 1e-20)
     uv_scale = texture_coordinates(uvs, positions, faces).scale
-    face_normal = (normal / twice_area[:, None]).astype(np.float32)
-    return uvs, tangents, faces, store.read("scene/face_material"), face_normal, uv_scale
+    return uvs, tangents, faces, store.read("scene/face_material"), face_normals(positions, faces), uv_scale

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
-from relume.raytrace.barycentric import EDGE_OFFSET_FRACTION
 from relume.raytrace.camera_rays import Hits
+from relume.raytrace.ray_origins import inner_barycentrics
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.shading_normals import MIN_FACING
 
@@ -24,11 +24,6 @@ _HITS_PER_RANGE = 16_384
 @nb.njit(nogil=True, cache=True, inline="always")
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@nb.njit(nogil=True, cache=True, inline="always")
-def _subtract(a, b):  # type: ignore[no-untyped-def]
-    return np.float64(a[0]) - b[0], np.float64(a[1]) - b[1], np.float64(a[2]) - b[2]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -46,18 +41,7 @@ def _flip(v, is_flipped):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _inner_barycentrics(uv, edges, twice_area, epsilon):  # type: ignore[no-untyped-def]
-    """Move barycentric coordinates off edges; see `relume.raytrace.barycentric`. edges: opposite to corners"""
-    per_area = 1 / max(twice_area, 1e-20)
-    a = max(1.0 - uv[0] - uv[1], min(epsilon * edges[0], 0.1 * twice_area) * per_area)
-    b = max(np.float64(uv[0]), min(epsilon * edges[1], 0.1 * twice_area) * per_area)
-    c = max(np.float64(uv[1]), min(epsilon * edges[2], 0.1 * twice_area) * per_area)
-    total = a + b + c
-    return a / total, b / total, c / total
-
-
-@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _normals(positions, normals, faces, face, uv, directions, epsilon, start, stop, out):  # type: ignore[no-untyped-def]
+def _normals(mesh, normals, face, uv, directions, start, stop, out):  # type: ignore[no-untyped-def]
     """Compute the normals at hits [start, stop). out: output. (n, 3) float32"""
     for k in range(start, stop):
         d = np.float64(directions[k, 0]), np.float64(directions[k, 1]), np.float64(directions[k, 2])
@@ -65,16 +49,10 @@ def _normals(positions, normals, faces, face, uv, directions, epsilon, start, st
         if face[k] < 0:
             out[k, 0], out[k, 1], out[k, 2] = view_direction
             continue
-        i, j, m = faces[face[k], 0], faces[face[k], 1], faces[face[k], 2]
-        ab, ac, bc = (
-            _subtract(positions[j], positions[i]), _subtract(positions[m], positions[i]), _subtract(positions[m],
-            positions[j]),
-        )  # fmt: skip
-        normal = ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]
-        twice_area = math.sqrt(_dot(normal, normal))
-        edges = math.sqrt(_dot(bc, bc)), math.sqrt(_dot(ac, ac)), math.sqrt(_dot(ab, ab))
-        barycentrics = _inner_barycentrics(uv[k], edges, twice_area, epsilon)
-        face_normal = _unit(normal, view_direction)
+        f = face[k]
+        i, j, m = mesh.faces[f, 0], mesh.faces[f, 1], mesh.faces[f, 2]
+        barycentrics = inner_barycentrics(mesh, f, uv[k, 0], uv[k, 1])
+        face_normal = np.float64(mesh.normal[f, 0]), np.float64(mesh.normal[f, 1]), np.float64(mesh.normal[f, 2])
         face_normal = _flip(face_normal, _dot(face_normal, d) > 0)
         x, y, z = 0.0, 0.0, 0.0
         for weight, corner in ((barycentrics[0], i), (barycentrics[1], j), (barycentrics[2], m)):
@@ -94,7 +72,7 @@ def normals_at(geometry: SceneBuffers, hits: Hits, directions: Shaped[F32, "n 3"
     Returns:
         Normals toward the viewer; the reversed direction for rays without a hit.
     """
-    out, epsilon = np.empty((len(directions), 3), np.float32), EDGE_OFFSET_FRACTION * geometry.epsilon
-    args = geometry.positions, geometry.normals, geometry.faces, hits.face, hits.uv, directions, epsilon
+    out = np.empty((len(directions), 3), np.float32)
+    args = geometry.origins, geometry.normals, hits.face, hits.uv, directions
     for_ranges(lambda start, stop: _normals(*args, start, stop, out), len(directions), _HITS_PER_RANGE)
     return out

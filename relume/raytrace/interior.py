@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.ray_origins import OriginMesh
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
@@ -60,12 +61,12 @@ class Surroundings(NamedTuple):
         return self.enclosed >= _CLOSED and self.front <= 1 - _CLOSED
 
 
-def first_obstacle(embree: EmbreeScene, path: Shaped[F64, "points 3"], epsilon: float) -> Obstacle | None:
+def first_obstacle(embree: EmbreeScene, origins: OriginMesh, path: Shaped[F64, "points 3"]) -> Obstacle | None:
     """Find the first surface on a path, glass included.
 
     Args:
-        embree: the triangles. path: corners of a polyline, meters.
-        epsilon: surfaces this close to the first corner are ignored: a camera on a surface can leave it. Meters.
+        embree, origins: the triangles. path: corners of a polyline, meters. A surface on which the first corner lies is
+            ignored: a camera on a surface can leave it.
     Returns:
         The obstacle; None if the path is free.
     """
@@ -74,14 +75,23 @@ def first_obstacle(embree: EmbreeScene, path: Shaped[F64, "points 3"], epsilon: 
     if len(rows) == 0:
         return None
     directions = (np.diff(path, axis=0)[rows] / length[rows, None]).astype(np.float32)
-    start = np.zeros(len(rows), np.float32)
-    start[0] = min(epsilon, 0.5 * float(length[rows[0]]))
-    hits = trace_rays(embree, path[rows].astype(np.float32), directions, STOP_AT_OPAQUE, start)
+    corners, start = path[rows].astype(np.float32), np.zeros(len(rows), np.float32)
+    start[0] = _distance_off_surface(embree, origins, corners[:1], directions[:1])
+    hits = trace_rays(embree, corners, directions, STOP_AT_OPAQUE, start)
     blocked = np.flatnonzero((hits.face >= 0) & (hits.distance <= length[rows]))
     if len(blocked) == 0:
         return None
     first = int(blocked[0])
     return Obstacle(float(length[: rows[first]].sum() + hits.distance[first]), int(hits.face[first]))
+
+
+def _distance_off_surface(embree: EmbreeScene, origins: OriginMesh, origin: F32, direction: F32) -> float:
+    """Distance from which a ray no longer meets the surface on which it starts; 0 off surfaces."""
+    hits = trace_rays(embree, origin, direction, STOP_AT_OPAQUE)
+    face, distance = hits.face[0], float(hits.distance[0])
+    if face < 0 or distance * abs(float(origins.normal[face] @ direction[0])) > origins.offset[face]:
+        return 0.0
+    return distance + float(origins.offset[face])
 
 
 def find_surroundings(

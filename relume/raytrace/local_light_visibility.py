@@ -38,30 +38,30 @@ _GROUP_SIZE = 4
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def shadow_ray(dx, dy, dz, distance, nx, ny, nz, surface_offset):  # type: ignore[no-untyped-def]
+def shadow_ray(dx, dy, dz, distance, nx, ny, nz, lift):  # type: ignore[no-untyped-def]
     """Compute the shadow ray to a light sample; it ends off the light's surface.
 
     Args:
-        dx, dy, dz, distance, nx, ny, nz: from `light_sample`. surface_offset: meters.
+        dx, dy, dz, distance, nx, ny, nz, lift: from `light_sample`.
     Returns:
         Direction (three), not normalized if the ray ends, and the ray's length in units of the direction's length.
     """
     # not normalized, so that the ray ends at 1; normalized for infinite rays
     length, num_lengths = (np.float32(1), distance) if distance == np.inf else (distance, np.float32(1))
     return (
-        length * dx + surface_offset * nx,
-        length * dy + surface_offset * ny,
-        length * dz + surface_offset * nz,
+        length * dx + lift * nx,
+        length * dy + lift * ny,
+        length * dz + lift * nz,
         num_lengths,
     )
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def _aim_packet(packet, light, strata, surface_offset, points, first, width, sample, num_samples):  # type: ignore[no-untyped-def]
+def _aim_packet(packet, light, strata, points, first, width, sample, num_samples):  # type: ignore[no-untyped-def]
     """Aim shadow rays of points [first, first + width) at one light sample, or at several adjacent ones.
 
     Args:
-        packet, light, strata, surface_offset, points: as in `_trace`.
+        packet, light, strata, points: as in `_trace`.
         sample, num_samples: lane k uses sample `sample` + k mod `num_samples`; a power of two.
     Returns:
         Number of active rays, whose points this sample may light.
@@ -72,14 +72,14 @@ def _aim_packet(packet, light, strata, surface_offset, points, first, width, sam
         p = first + min(k, width - 1)
         x, y, z = position[p, 0], position[p, 1], position[p, 2]
         shift_u, shift_v = cranley_patterson_offset(strata, seed[p])
-        dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
+        dx, dy, dz, distance, weight, nx, ny, nz, lift = light_sample(
             light, strata, sample + (k & (num_samples - 1)), shift_u, shift_v, x, y, z
         )
         is_above = dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2] > 0
         is_active = k < width and is_above and weight > 0
         enable_lane(packet, k, is_active)
         num_active += 1 if is_active else 0
-        along_x, along_y, along_z, num_lengths = shadow_ray(dx, dy, dz, distance, nx, ny, nz, surface_offset)
+        along_x, along_y, along_z, num_lengths = shadow_ray(dx, dy, dz, distance, nx, ny, nz, lift)
         set_origin(packet, k, x, y, z)
         enable_stochastic_alpha(packet, k, alpha_sample[min(p, alpha_sample.shape[0] - 1)])
         set_direction(packet, k, along_x, along_y, along_z, num_lengths)
@@ -96,7 +96,7 @@ def _count_unoccluded(packet, width):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(tracer, light, strata, surface_offset, points, start, stop, bits):  # type: ignore[no-untyped-def]
+def _trace(tracer, light, strata, points, start, stop, bits):  # type: ignore[no-untyped-def]
     """Trace points [start, stop); start is a multiple of 16."""
     packet, num = new_packet(tracer), strata.uv.shape[0]
     for first in range(start, stop, LANES):
@@ -105,8 +105,7 @@ def _trace(tracer, light, strata, surface_offset, points, start, stop, bits):  #
             all_unoccluded = False
             if (
                 num >= MIN_GROUPED_SAMPLES
-                and _aim_packet(packet, light, strata, surface_offset, points, first, width, group, _GROUP_SIZE)
-                == width
+                and _aim_packet(packet, light, strata, points, first, width, group, _GROUP_SIZE) == width
             ):
                 trace_shadows(packet)
                 num_unoccluded = _count_unoccluded(packet, width)
@@ -114,7 +113,7 @@ def _trace(tracer, light, strata, surface_offset, points, start, stop, bits):  #
                     continue
                 all_unoccluded = num_unoccluded == width
             for sample in range(group, min(group + _GROUP_SIZE, num)):
-                if _aim_packet(packet, light, strata, surface_offset, points, first, width, sample, 1) == 0:
+                if _aim_packet(packet, light, strata, points, first, width, sample, 1) == 0:
                     continue
                 if not all_unoccluded:
                     trace_shadows(packet)
@@ -124,20 +123,19 @@ def _trace(tracer, light, strata, surface_offset, points, start, stop, bits):  #
 
 
 def trace_light_visibility(
-    scene: EmbreeScene, surface_offset: float, light: LocalLight, strata: LightStrata, points: SurfacePoints
+    scene: EmbreeScene, light: LocalLight, strata: LightStrata, points: SurfacePoints
 ) -> Shaped[NDArray[np.uint8], "n bytes"]:
     """Trace every point against every light sample above its horizon with nonzero weight.
 
     Args:
         scene: the occluding triangles.
-        surface_offset: distance in meters between the ends of rays and the light's surface.
         light: the light. strata: its samples, from `make_light_strata`, shifted by the points' seeds.
         points: n points that the light may reach, ordered by neighborhood.
     Returns:
         Visibility of sample k at bit k & 7 of byte k >> 3; ceil(samples / 8) bytes
     """
     bits = np.zeros((points.num_points, (len(strata.uv) + 7) // 8), np.uint8)
-    args = scene.shadow_tracer(coherent=True), light, strata, np.float32(surface_offset), points
+    args = scene.shadow_tracer(coherent=True), light, strata, points
     for_ranges(lambda start, stop: _trace(*args, start, stop, bits), points.num_points, _POINTS_PER_RANGE)
     return bits
 
@@ -152,7 +150,7 @@ def _sum_irradiance(light, strata, points, visible, start, stop, irradiance):  #
         total = 0.0
         for sample in range(strata.uv.shape[0]):
             if (visible[p, sample >> 3] >> (sample & 7)) & 1:
-                dx, dy, dz, _, weight, _, _, _ = light_sample(light, strata, sample, shift_u, shift_v, x, y, z)
+                dx, dy, dz, _, weight, _, _, _, _ = light_sample(light, strata, sample, shift_u, shift_v, x, y, z)
                 total += weight * max(dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2], np.float32(0))
         irradiance[p] = total
 

@@ -96,7 +96,7 @@ def _trace_points(packet, points, first, width, rays, contribution, are_seeds, v
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _aim(light, strata, surface_offset, points, first, width, rays, contribution):  # type: ignore[no-untyped-def]
+def _aim(light, strata, points, first, width, rays, contribution):  # type: ignore[no-untyped-def]
     """Aim the rays of a block's points, `BLOCK` rays per sample: direction and end, and w · cos θi."""
     position, normal, _, seed, _ = points
     for k in range(width):
@@ -105,15 +105,15 @@ def _aim(light, strata, surface_offset, points, first, width, rays, contribution
         shift_u, shift_v = cranley_patterson_offset(strata, seed[p])
         for sample in range(strata.uv.shape[0]):
             r = sample * BLOCK + k
-            dx, dy, dz, distance, weight, nx, ny, nz = light_sample(light, strata, sample, shift_u, shift_v, x, y, z)
-            contribution[r] = weight * (dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2])
-            rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3] = shadow_ray(
-                dx, dy, dz, distance, nx, ny, nz, surface_offset
+            dx, dy, dz, distance, weight, nx, ny, nz, lift = light_sample(
+                light, strata, sample, shift_u, shift_v, x, y, z
             )
+            contribution[r] = weight * (dx * normal[p, 0] + dy * normal[p, 1] + dz * normal[p, 2])
+            rays[r, 0], rays[r, 1], rays[r, 2], rays[r, 3] = shadow_ray(dx, dy, dz, distance, nx, ny, nz, lift)
 
 
 @nb.njit(nogil=True, cache=True)
-def _light_block(tracer, light, strata, surface_offset, points, start, stop, irradiance, bits):  # type: ignore[no-untyped-def]
+def _light_block(tracer, light, strata, points, start, stop, irradiance, bits):  # type: ignore[no-untyped-def]
     """Compute the light at points [start, stop); start is a multiple of `BLOCK`."""
     packet = new_packet(tracer)
     num_rays = BLOCK * strata.uv.shape[0]
@@ -124,7 +124,7 @@ def _light_block(tracer, light, strata, surface_offset, points, start, stop, irr
     )
     for first in range(start, stop, BLOCK):
         width = min(BLOCK, stop - first)
-        _aim(light, strata, surface_offset, points, first, width, rays, contribution)
+        _aim(light, strata, points, first, width, rays, contribution)
         num_traced, num_visible = _trace_points(packet, points, first, width, rays, contribution, True, visible)
         if num_traced > 0 and num_visible == 0:
             continue
@@ -141,19 +141,18 @@ def _light_block(tracer, light, strata, surface_offset, points, start, stop, irr
 
 
 def trace_moving_light(
-    scene: EmbreeScene, surface_offset: float, light: LocalLight, strata: LightStrata, points: SurfacePoints
+    scene: EmbreeScene, light: LocalLight, strata: LightStrata, points: SurfacePoints
 ) -> MovingLight:
     """Compute the light at points; trace shadow edges and predict elsewhere.
 
     Args:
         scene: the occluding triangles.
-        surface_offset: distance in meters between the ends of rays and the light's surface.
         light: the light. strata: its samples, from `make_light_strata`, shifted by the points' seeds.
         points: n points that the light may reach, mostly ordered by neighborhood.
     """
     num, num_bytes = points.num_points, (len(strata.uv) + 7) // 8
     moving_light = MovingLight(np.zeros(num, np.float32), np.zeros((num, num_bytes), np.uint8))
-    args = scene.shadow_tracer(coherent=True), light, strata, np.float32(surface_offset), points
+    args = scene.shadow_tracer(coherent=True), light, strata, points
 
     def kernel(start: int, stop: int) -> None:
         first, last = start * BLOCK, min(stop * BLOCK, num)

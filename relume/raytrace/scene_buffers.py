@@ -10,11 +10,11 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.math.bounding_box import bounding_box
 from relume.raytrace.alpha_filter import IGNORE_GLASS, AlphaTest
 from relume.raytrace.alpha_test import collect_alpha_masks
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.embree import EmbreeScene
+from relume.raytrace.ray_origins import OriginMesh
 from relume.scene.merge_meshes import merge_meshes
 from relume.scene.model import Scene
 
@@ -32,7 +32,6 @@ class SceneBuffers:
         faces: vertex indices of the corners.
         face_material: index into the scene's materials.
         face_mesh: index into the scene's meshes.
-        epsilon: offset of ray origins from surfaces, meters.
     """
 
     positions: Shaped[F32, "vertices 3"]
@@ -43,14 +42,16 @@ class SceneBuffers:
     face_material: Shaped[NDArray[np.int32], " faces"]
     face_mesh: Shaped[NDArray[np.int32], " faces"]
     embree: EmbreeScene
-    epsilon: float
 
     @cached_property
     def face_normals(self) -> Shaped[F32, "faces 3"]:
         """Unit normals of the triangles, with their corners counterclockwise."""
-        a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
-        normal = np.cross(b - a, c - a)
-        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
+        return face_normals(self.positions, self.faces)
+
+    @cached_property
+    def origins(self) -> OriginMesh:
+        """The triangles, as origins of rays."""
+        return OriginMesh.build(self.positions, self.faces, self.face_normals)
 
     @cached_property
     def face_areas(self) -> Shaped[F64, " faces"]:
@@ -79,11 +80,13 @@ class SceneBuffers:
         return is_front(self.embree, self.positions, self.faces, origin, points)
 
 
-def ray_epsilon(positions: Shaped[F32, "n 3"]) -> float:
-    """Offset of ray origins from surfaces with these vertices, meters."""
-    # rounding of float32 grows with the distance from the world's origin, so the offset depends on it and on the size
-    low, high = bounding_box(positions)
-    return 1e-5 * float(max(-low.min(), high.max()) + np.linalg.norm(high - low))
+def face_normals(
+    positions: Shaped[F32, "vertices 3"], faces: Shaped[NDArray[np.uint32], "faces 3"]
+) -> Shaped[F32, "faces 3"]:
+    """Unit normals of triangles, with their corners counterclockwise; zero without an area."""
+    a, b, c = positions[faces].astype(np.float64).transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
 
 
 def is_front(
@@ -131,5 +134,4 @@ def build_scene_buffers(scene: Scene) -> SceneBuffers:
         face_material=face_material,
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
         embree=EmbreeScene.build(mesh_buffers.positions, mesh_buffers.faces, alpha_test),
-        epsilon=ray_epsilon(mesh_buffers.positions),
     )

@@ -31,8 +31,8 @@ class SurfaceInteraction:
     """Surface points and texture values at n ray hits.
 
     Attributes:
-        points: points with normals toward the viewer, off the surface by the scene's epsilon; their seeds are their
-            indices.
+        points: points with normals toward the viewer, off the surface as `relume.raytrace.ray_origins` has it; their
+            seeds are their indices.
         diffuse, specular: texture channels, 1 without a texture.
         uv: texture coordinates (u, v), side of the pixel's footprint in UV space, angle from the tangent to the u axis
             in radians, −1 if the texture is mirrored, else 1; then the two sides of that footprint, (u, v) each.

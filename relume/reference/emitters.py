@@ -25,7 +25,7 @@ F64 = NDArray[np.float64]
 
 _DIRECTIONAL_DISTANCE = 1e9  # meters to a directional light
 _RAYS_PER_BATCH = 8192  # larger batches would be split among threads that already wait for this one
-_SLACK = 4.0  # tolerance at the ends of shadow rays, in units of the geometry's epsilon
+_DISTANCE_SLACK, _POSITION_SLACK = 1e-5, 1e-6  # at the ends of shadow rays: of their length and of its coordinates
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,8 @@ class ReferenceEmitter:
         start = np.repeat(position, direction.shape[1], axis=0).astype(np.float32)
         ray_alpha_sample = alpha_sample if len(alpha_sample) == 1 else np.repeat(alpha_sample, direction.shape[1])
         ray_length = hit_distance(geometry, start, flat, ray_alpha_sample).reshape(distance.shape)
-        is_visible = ray_length > distance - _SLACK * geometry.epsilon - 1e-5 * distance
+        largest = np.abs(position[:, None] + to_light).max(axis=2)
+        is_visible = ray_length > distance - _DISTANCE_SLACK * distance - _POSITION_SLACK * largest
         return LocalLightSamples(direction, factor * is_visible[..., None] * np.array(self.look.gain))
 
     def _sample_vectors(self, position: F64, num: int, rng: np.random.Generator) -> tuple[F64, F64]:

@@ -197,7 +197,7 @@ def _outline(area_light, part_index, sample, shift, position, area, scratch):  #
             normal[axis] = parts.normal[part_index, axis]
         return parts.first_fraction[part_index]
     # a sample that covers several pieces represents a square of its area
-    dx, dy, dz, distance, _, nx, ny, nz = light_sample(
+    dx, dy, dz, distance, _, nx, ny, nz, _ = light_sample(
         area_light.light, area_light.strata, sample, shift[0], shift[1], position[0], position[1], position[2]
     )
     normal[0], normal[1], normal[2] = nx, ny, nz

@@ -19,12 +19,12 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.math.rgb9e5 import unpack_rgb9e5
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import angle_at_quantile, lobe_direction, ray_jitter
+from relume.raytrace.ray_origins import NO_ORIGINS, OriginMesh, ray_origin
 from relume.raytrace.ray_packet import (
     LANES,
     enable_lane,
     get_direction,
     get_hit,
-    get_position,
     get_uv,
     set_direction,
     set_origin,
@@ -42,7 +42,7 @@ END, ESCAPE, REFLECTION, TRANSMISSION = np.uint8(0), np.uint8(1), np.uint8(2), n
 """Kinds of entries in `LobePaths`."""
 
 _HALF, _ONE = np.float32(0.5), np.float32(1)
-_SHORTEST = 1e-9  # edge, meters
+_SHORTEST = 1e-30  # edge, meters
 
 
 class LobePaths(NamedTuple):
@@ -110,7 +110,7 @@ class LobeSurfaces(NamedTuple):
     """Surfaces that lobe rays meet, and from which they go on.
 
     Attributes:
-        faces: corners of the triangles. face_material: their materials.
+        face_material: materials of the triangles.
         normals: of the corners; empty if only those of the triangles are known.
         curvature: largest change of the normal along an edge of each triangle, per meter.
         lobe: row of each material in the following arrays, −1 if rays end there.
@@ -123,10 +123,9 @@ class LobeSurfaces(NamedTuple):
         glass: transmittance of each material for red, green and blue without reflectance, −1 if it is opaque, and the
             reflectance at normal incidence; no rows for a scene without glass.
         is_two_sided: of each material, whether it emits to both sides.
-        offset: of ray origins from surfaces, meters.
+        origins: the triangles, as origins of rays.
     """
 
-    faces: Shaped[NDArray[np.uint32], "faces 3"]
     face_material: Shaped[NDArray[np.int32], " faces"]
     normals: Shaped[F32, "corners 3"]
     curvature: Shaped[F32, " faces"]
@@ -142,7 +141,7 @@ class LobeSurfaces(NamedTuple):
     specular: int
     glass: Shaped[F32, "materials 4"]
     is_two_sided: Shaped[NDArray[np.bool_], " materials"]
-    offset: float
+    origins: OriginMesh
 
     @property
     def max_entries(self) -> int:
@@ -151,7 +150,6 @@ class LobeSurfaces(NamedTuple):
 
 
 NO_SURFACES = LobeSurfaces(
-    faces=np.empty((0, 3), np.uint32),
     face_material=np.empty(0, np.int32),
     normals=np.empty((0, 3), np.float32),
     curvature=np.empty(0, np.float32),
@@ -167,7 +165,7 @@ NO_SURFACES = LobeSurfaces(
     specular=-1,
     glass=np.empty((0, 4), np.float32),
     is_two_sided=np.empty(0, np.bool_),
-    offset=0.0,
+    origins=NO_ORIGINS,
 )
 """Of a scene in which all rays end at the first surface."""
 
@@ -192,7 +190,8 @@ def _normal_at_hit(packet, k, face, face_normal, surfaces):  # type: ignore[no-u
     if surfaces.normals.shape[0] == 0:
         return (fx, fy, fz), (fx, fy, fz)
     u, v = get_uv(packet, k)
-    a, b, c = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
+    faces = surfaces.origins.faces
+    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
     w = _ONE - u - v
     nx = side * (w * surfaces.normals[a, 0] + u * surfaces.normals[b, 0] + v * surfaces.normals[c, 0])
     ny = side * (w * surfaces.normals[a, 1] + u * surfaces.normals[b, 1] + v * surfaces.normals[c, 1])
@@ -201,6 +200,14 @@ def _normal_at_hit(packet, k, face, face_normal, surfaces):  # type: ignore[no-u
     if length < np.float32(1e-6) or nx * dx + ny * dy + nz * dz > 0:
         return (fx, fy, fz), (fx, fy, fz)
     return (nx / length, ny / length, nz / length), (fx, fy, fz)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _set_origin_on(packet, k, origins, face, is_inner):  # type: ignore[no-untyped-def]
+    """Move the origin of a lane to its hit on a face, on the outer or inner side."""
+    u, v = get_uv(packet, k)
+    px, py, pz = ray_origin(origins, face, u, v, -1 if is_inner else 1)
+    set_origin(packet, k, px, py, pz)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
@@ -228,9 +235,9 @@ def _reflect(packet, k, lobe, random, face_normal, surfaces, throughput, normal)
     angle = angle_at_quantile(surfaces.quantile, lobe, _HALF * random[0])
     (x, y, z), is_valid = lobe_direction(surfaces.is_half_angle[lobe], angle, random[1], ox, oy, oz)
     wx, wy, wz = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
-    offset, facing = np.float32(surfaces.offset), f[0] * wx + f[1] * wy + f[2] * wz
-    px, py, pz = get_position(packet, k, 0), get_position(packet, k, 1), get_position(packet, k, 2)
-    set_origin(packet, k, px + offset * f[0], py + offset * f[1], pz + offset * f[2])
+    facing = f[0] * wx + f[1] * wy + f[2] * wz
+    is_inner = face_normal[face, 0] * dx + face_normal[face, 1] * dy + face_normal[face, 2] * dz > 0
+    _set_origin_on(packet, k, surfaces.origins, face, is_inner)
     set_direction(packet, k, wx, wy, wz, np.float32(np.inf))
     return is_valid and z > 0 and facing > 0
 
@@ -250,9 +257,7 @@ def _transmit(packet, k, material, face_normal, surfaces, throughput):  # type: 
     passing = _ONE - f0 - (_ONE - f0) * (_ONE - min(abs(facing), _ONE)) ** 5
     for channel in range(3):
         throughput[channel, k] *= passing * surfaces.glass[material, channel]
-    offset = np.float32(surfaces.offset) if facing > 0 else -np.float32(surfaces.offset)
-    px, py, pz = get_position(packet, k, 0), get_position(packet, k, 1), get_position(packet, k, 2)
-    set_origin(packet, k, px + offset * nx, py + offset * ny, pz + offset * nz)
+    _set_origin_on(packet, k, surfaces.origins, face, facing < 0)
     set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
 
 

@@ -68,7 +68,7 @@ def list_local_rays(points, wo, light, strata, gain, visible, start, stop, liste
         for sample in range(strata.uv.shape[0]):
             if not (visible[p, sample >> 3] >> (sample & 7)) & 1:
                 continue
-            dx, dy, dz, _, weight, _, _, _ = light_sample(
+            dx, dy, dz, _, weight, _, _, _, _ = light_sample(
                 light, strata, sample, shift_u, shift_v, position[p, 0], position[p, 1], position[p, 2]
             )
             z = n[0] * dx + n[1] * dy + n[2] * dz

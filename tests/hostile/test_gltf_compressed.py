@@ -12,11 +12,12 @@ from typing import Any
 import DracoPy
 import numpy as np
 import pytest
-from hostile_scenes import rejected
+from hostile_scenes import LIGHT, rejected
 from packed_glb import SIDE, VECTORS, Glb, draco_bytes, draco_glb, meshopt_glb
 
 from relume.core.errors import SceneError
 from relume.scene_io.gltf import import_gltf
+from relume.scene_io.import_scene import import_scene
 from relume.scene_io.meshopt import MeshoptError, decode_sequence, decode_triangles, decode_vertices
 
 HUGE = 2**31

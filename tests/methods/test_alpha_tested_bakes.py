@@ -60,9 +60,7 @@ def test_local_lights_of_an_opened_bake_pass_through_holes(scene, direct):
     points = make_surface_points(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
     geometry = build_scene_buffers(scene)
     prepared = prepare_local_lights(POINT_LIGHT)
-    expected = trace_light_visibility(
-        geometry.embree, geometry.epsilon, prepared, make_light_strata(prepared, 64), points
-    )
+    expected = trace_light_visibility(geometry.embree, prepared, make_light_strata(prepared, 64), points)
     visible = direct.local.shadows(POINT_LIGHT, points).visible
     np.testing.assert_array_equal(visible, expected)
     assert 0.3 < (visible & 1).mean() < 0.9

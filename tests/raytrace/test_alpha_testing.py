@@ -121,7 +121,6 @@ def test_light_passes_holes_to_points_and_from_local_lights():
     directional = prepare_local_lights(LightGeometry("directional", direction=(0.0, 0.0, -1.0)))
     light_visibility = trace_light_visibility(
         geometry.embree,
-        geometry.epsilon,
         directional,
         make_light_strata(directional, 1),
         make_surface_points(points, up),

@@ -6,11 +6,11 @@ from tiny_scenes import quad, sphere
 
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.interior import find_surroundings, first_obstacle, interior_camera, sees_only_outside
+from relume.raytrace.ray_origins import OriginMesh
 from relume.raytrace.scene_buffers import merge_meshes
 from relume.scene.examples.catalog import built_in
 from relume.scene.model import Camera
 
-EPSILON = 1e-4
 LOW, HIGH = np.array([-3.0, 0, -2]), np.array([3.0, 2.8, 2])
 
 
@@ -41,10 +41,18 @@ def traced(*meshes):
     return EmbreeScene.build(buffers.positions, buffers.faces), normals.astype(np.float32)
 
 
+def obstacle(path, *meshes):
+    """The first of the meshes on a path."""
+    buffers, (embree, normals) = merge_meshes(meshes), traced(*meshes)
+    return first_obstacle(embree, OriginMesh.build(buffers.positions, buffers.faces, normals), path)
+
+
+ROOM = *box(LOW, HIGH, inward=True), *box(LOW - 0.3, HIGH + 0.3)  # closed, with walls 0.3 m thick and no door
+
+
 @pytest.fixture(scope="module")
 def room():
-    """A closed room with walls 0.3 m thick and no door."""
-    return traced(*box(LOW, HIGH, inward=True), *box(LOW - 0.3, HIGH + 0.3))
+    return traced(*ROOM)
 
 
 def path(*points):
@@ -52,25 +60,35 @@ def path(*points):
 
 
 def test_the_first_surface_stops_a_path_at_its_length(room):
-    embree, normals = room
-    obstacle = first_obstacle(embree, path((0, 1, 0), (2, 1, 0), (2, 1, 1), (4, 1, 1)), EPSILON)
-    assert obstacle.length == pytest.approx(2 + 1 + 1, abs=1e-5)
-    np.testing.assert_allclose(normals[obstacle.face], [-1, 0, 0], atol=1e-6)
-    assert first_obstacle(embree, path((0, 1, 0), (2, 1, 0), (2, 1, 1)), EPSILON) is None
-    assert first_obstacle(embree, path((0, 1, 0), (0, 1, 0)), EPSILON) is None
+    _, normals = room
+    wall = obstacle(path((0, 1, 0), (2, 1, 0), (2, 1, 1), (4, 1, 1)), *ROOM)
+    assert wall.length == pytest.approx(2 + 1 + 1, abs=1e-5)
+    np.testing.assert_allclose(normals[wall.face], [-1, 0, 0], atol=1e-6)
+    assert obstacle(path((0, 1, 0), (2, 1, 0), (2, 1, 1)), *ROOM) is None
+    assert obstacle(path((0, 1, 0), (0, 1, 0)), *ROOM) is None
 
 
-def test_a_camera_on_a_surface_leaves_it_to_both_sides_and_a_thin_wall_stops_it():
-    wall = quad("wall", [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], 0)
-    embree, _ = traced(wall)
-    for z in (1, -1):
-        assert first_obstacle(embree, path((0, 0, 0), (0, 0, z)), EPSILON) is None
+@pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
+def test_a_camera_on_a_surface_leaves_it_to_both_sides_and_a_thin_wall_stops_it(size):
+    corners = size * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    wall = quad("wall", corners, 0)
+    for z in (size, -size):
+        assert obstacle(path((0, 0, 0), (0, 0, z)), wall) is None
     for thickness in (0, 1e-7, 1e-5, 1e-3):
-        back = quad("back", [[-1, -1, -thickness], [1, -1, -thickness], [1, 1, -thickness], [-1, 1, -thickness]], 0)
-        thin, _ = traced(wall, back)
-        for z in (1, -1):
-            obstacle = first_obstacle(thin, path((0.1, 0.2, z), (0.1, 0.2, -z)), EPSILON)
-            assert obstacle.length == pytest.approx(1, abs=2e-3)
+        back = quad("back", corners - [0, 0, thickness * size], 0)
+        for z in (size, -size):
+            surface = obstacle(path((0.1 * size, 0.2 * size, z), (0.1 * size, 0.2 * size, -z)), wall, back)
+            assert surface.length == pytest.approx(size, rel=2e-3)
+
+
+def test_a_camera_on_a_tilted_surface_far_from_the_origin_leaves_it_and_meets_the_next():
+    """Positions there are 0.03 m apart."""
+    at = np.array([4e5, 2e5, -3e5])
+    corners = np.array([[-5, 1, -5], [5, 2, -5], [5, 3, 5], [-5, 2, 5]], float)  # a parallelogram
+    floor, ceiling = (quad("plane", at + corners + [0, y, 0], 0) for y in (0, 4))
+    start = floor.positions.astype(float).mean(axis=0)
+    surface = obstacle(np.stack([start, start + np.array([0, 9, 0])]), floor, ceiling)
+    assert surface.length == pytest.approx(4, abs=0.1)
 
 
 def test_points_are_in_rooms_in_solids_or_in_the_open(room):
@@ -94,7 +112,7 @@ def test_a_camera_is_put_into_a_closed_room(room):
     assert (position > LOW).all()
     assert (position < HIGH).all()
     assert position[1] == pytest.approx(1.4, abs=1e-3)  # half of a room of less than 3.2 m
-    assert first_obstacle(room[0], np.array([position, position + 3 * forward]), EPSILON) is None
+    assert obstacle(np.array([position, position + 3 * forward]), *ROOM) is None
     np.testing.assert_allclose(camera.to_world[:3, :3].T @ camera.to_world[:3, :3], np.eye(3), atol=1e-12)
     outside = Camera("front", np.eye(4), 0.7)
     outside.to_world[:3, 3] = 0, 1, 9

@@ -55,7 +55,7 @@ def test_visibility_bits_equal_segment_intersections(surfaces, light):
     made = prepare_local_lights(light)
     strata = make_light_strata(made, 16)
     points = make_surface_points(position, normal, first=100)
-    visibility = trace_light_visibility(geometry.embree, geometry.epsilon, made, strata, points)
+    visibility = trace_light_visibility(geometry.embree, made, strata, points)
     bits = np.unpackbits(visibility, axis=1, bitorder="little")[:, : len(strata.uv)].astype(bool)
     triangles = geometry.positions[geometry.faces].astype(float)
     wrong = 0
@@ -82,9 +82,7 @@ def test_many_samples_are_traced_in_fours_where_neighbors_agree():
     position = np.stack([x, 0 * x, z], axis=2).reshape(-1, 3).astype(np.float32)
     points = make_surface_points(position, np.tile(UP, (32, 1)))
     hides = quad("card", card, 0)
-    bits = np.unpackbits(
-        trace_light_visibility(embree_of(hides), 1e-5, made, strata, points), axis=1, bitorder="little"
-    )
+    bits = np.unpackbits(trace_light_visibility(embree_of(hides), made, strata, points), axis=1, bitorder="little")
     offset = np.array(
         [
             [
@@ -109,7 +107,7 @@ def irradiance(geometry, light, position, normal, triangles=None, num_samples=64
     made = prepare_local_lights(light, triangles)
     strata = make_light_strata(made, num_samples)
     points = make_surface_points(position, normal)
-    return compute_irradiance(made, strata, points, trace_light_visibility(geometry, 1e-5, made, strata, points))
+    return compute_irradiance(made, strata, points, trace_light_visibility(geometry, made, strata, points))
 
 
 def embree_of(*meshes):

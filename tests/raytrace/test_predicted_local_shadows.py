@@ -55,12 +55,9 @@ def test_blocks_are_predicted_if_their_samples_agree(surfaces, light):
     made = prepare_local_lights(light)
     strata = make_light_strata(made, 4)
     along = (made, strata, make_surface_points(position, normal))
-    rough = trace_moving_light(geometry.embree, geometry.epsilon, *along)
+    rough = trace_moving_light(geometry.embree, *along)
     visible, is_traced = (
-        np.unpackbits(trace_light_visibility(scene, geometry.epsilon, *along), axis=1, bitorder="little")[
-            :, : len(strata.uv)
-        ]
-        > 0
+        np.unpackbits(trace_light_visibility(scene, *along), axis=1, bitorder="little")[:, : len(strata.uv)] > 0
         for scene in (geometry.embree, FAR)
     )
     expected = np.packbits(predicted(visible, is_traced), axis=1, bitorder="little")
@@ -76,6 +73,6 @@ def test_unlit_points_stay_dark(surfaces):
     made = prepare_local_lights(LightGeometry("point", (0.9, 1.4, 0.6)))
     strata = make_light_strata(made, 4)
     points = make_surface_points(position, normal)._replace(normal=0 * normal)
-    rough = trace_moving_light(geometry.embree, geometry.epsilon, made, strata, points)
+    rough = trace_moving_light(geometry.embree, made, strata, points)
     assert not rough.irradiance.any()
     assert not rough.visible.any()

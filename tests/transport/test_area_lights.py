@@ -145,7 +145,7 @@ def test_a_partly_occluded_light_is_reflected():
         for ends in ((0, 1), (-2.3, 3.1))
     )
     of_panel, strata = floor_under(open_air), make_light_strata(behind, MESH_SAMPLE_FACTOR * SAMPLES)
-    visibility = trace_light_visibility(blocks, 1e-5, behind, strata, of_panel.points)
+    visibility = trace_light_visibility(blocks, behind, strata, of_panel.points)
     lit = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), visibility),))
     expected, actual = (
         Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]

@@ -89,12 +89,11 @@ def test_rays_meet_what_single_rays_meet(geometry, lookup, points):
     assert len(hits.paths.ray) == 0
 
 
-def polished_ceiling(blur=0.0, curvature=0.0):
+def polished_ceiling(geometry, blur=0.0, curvature=0.0):
     lobe = sample_lobe(CHROME, NO_LEVELS)
     tint = np.ones((NO_PATCH + 1, 3), np.float32)
     tint[9] = 1, 0.5, 0.25
     return LobeSurfaces(
-        faces=np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]], np.uint32),
         face_material=np.array([0, 0, 1, 1], np.int32),
         normals=np.empty((0, 3), np.float32),
         curvature=np.full(4, curvature, np.float32),
@@ -110,13 +109,13 @@ def polished_ceiling(blur=0.0, curvature=0.0):
         specular=-1,
         glass=np.empty((0, 4), np.float32),
         is_two_sided=np.array([False, False]),
-        offset=1e-4,
+        origins=geometry.origins,
     )
 
 
 def test_rays_go_on_from_polished_surfaces(geometry, lookup, points):
     pattern = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7)
-    hits = trace_lobe_rays(geometry, lookup, polished_ceiling(), *points, NO_FOOTPRINT, None, pattern)
+    hits = trace_lobe_rays(geometry, lookup, polished_ceiling(geometry), *points, NO_FOOTPRINT, None, pattern)
     paths = hits.paths
     assert len(paths.ray) == np.count_nonzero(hits.patch == 9)
     assert np.all(np.diff(paths.first) >= 0)
@@ -137,7 +136,9 @@ def test_rays_go_on_from_polished_surfaces(geometry, lookup, points):
 
 def test_wide_lobes_store_where_they_are_lit(geometry, lookup, points):
     pattern = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7)
-    paths = trace_lobe_rays(geometry, lookup, polished_ceiling(0.1), *points, NO_FOOTPRINT, None, pattern).paths
+    paths = trace_lobe_rays(
+        geometry, lookup, polished_ceiling(geometry, 0.1), *points, NO_FOOTPRINT, None, pattern
+    ).paths
     lit = paths.kind == REFLECTION
     assert np.count_nonzero(lit) == np.count_nonzero(~lit)
     assert set(paths.patch[lit]) == {9}
@@ -147,7 +148,7 @@ def test_wide_lobes_store_where_they_are_lit(geometry, lookup, points):
 def test_ray_footprints_grow_where_they_meet_a_curved_surface(geometry, lookup, points):
     pattern, spread = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7), {}
     for curvature in (0.0, 3.0):
-        surfaces = polished_ceiling(0.1, curvature)
+        surfaces = polished_ceiling(geometry, 0.1, curvature)
         paths = trace_lobe_rays(geometry, lookup, surfaces, *points, NO_FOOTPRINT, None, pattern).paths
         lit = paths.kind == REFLECTION
         spread[curvature], distance = paths.spread[lit], 1 / np.abs(paths.direction[lit, 1])
@@ -158,7 +159,7 @@ def test_ray_footprints_grow_where_they_meet_a_curved_surface(geometry, lookup, 
 
 def test_selected_points_keep_their_paths(geometry, lookup, points):
     pattern = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7)
-    hits = trace_lobe_rays(geometry, lookup, polished_ceiling(0.1), *points, NO_FOOTPRINT, None, pattern)
+    hits = trace_lobe_rays(geometry, lookup, polished_ceiling(geometry, 0.1), *points, NO_FOOTPRINT, None, pattern)
     rows = np.array([150, 3, 77])
     some = hits.rows(rows)
     for k, row in enumerate(rows):
@@ -220,7 +221,7 @@ def test_footprints_grow_with_distance_and_lobe(geometry, lookup, points):
 
 def test_textures_tint_what_polished_surfaces_reflect(geometry, lookup, points):
     pattern = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 21, 7)
-    surfaces = with_textured_ceiling(geometry, polished_ceiling())._replace(specular=0)
+    surfaces = with_textured_ceiling(geometry, polished_ceiling(geometry))._replace(specular=0)
     paths = trace_lobe_rays(geometry, lookup, surfaces, *points, NO_FOOTPRINT, None, pattern).paths
     assert len(paths.ray) > 0
     np.testing.assert_allclose(paths.throughput[:, 2], 0.8 * 0.5, rtol=0.01)
@@ -253,7 +254,7 @@ def glazed():
         lobe=np.full(3, -1, np.int32),
         glass=np.array([[-1] * 4, [-1] * 4, [*TINT, 0.04]], np.float32),
         is_two_sided=np.zeros(3, np.bool_),
-        offset=geometry.epsilon,
+        origins=geometry.origins,
     )
     return geometry, lookup, surfaces
 

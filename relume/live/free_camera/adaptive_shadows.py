@@ -60,13 +60,9 @@ def visible_fractions(
 
 
 def _shadow_rays(solid: OcclusionMesh, gbuffer: GBuffer, camera: Camera, height: int) -> ShadowRays:
-    stored_scene = solid.stored_scene
     pixel = 2 * math.tan(camera.yfov / 2) / height
     right, up = (np.ascontiguousarray(camera.to_world[:3, k] * pixel, np.float32) for k in (0, 1))
-    return ShadowRays(
-        solid.positions, solid.edge_offset, stored_scene.faces, stored_scene.face_material, stored_scene.face_normal,
-        gbuffer.hits, gbuffer.directions, right, up, np.float32(solid.surface_offset),
-    )  # fmt: skip
+    return ShadowRays(solid.origins, solid.stored_scene.face_material, gbuffer.hits, gbuffer.directions, right, up)
 
 
 def _trace_pixels(trace_arguments: _TraceArguments, gbuffer: GBuffer, size: tuple[int, int], num_visible: U8) -> None:

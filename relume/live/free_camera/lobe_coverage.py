@@ -123,7 +123,7 @@ def nearest_point(triangle, normal, position, direction):  # type: ignore[no-unt
             e, f = triangle[1, axis] - triangle[0, axis], triangle[2, axis] - triangle[0, axis]
             h = position[axis] + distance * direction[axis] - triangle[0, axis]
             ee, ef, ff, he, hf = ee + e * e, ef + e * f, ff + f * f, he + h * e, hf + h * f
-        scale = _ONE / max(ee * ff - ef * ef, np.float32(1e-30))
+        scale = _ONE / max(np.float64(ee) * ff - np.float64(ef) * ef, 1e-300)  # m⁴
         u, v = max(scale * (ff * he - ef * hf), _ZERO), max(scale * (ee * hf - ef * he), _ZERO)
         total = max(u + v, _ONE)
         u, v = u / total, v / total

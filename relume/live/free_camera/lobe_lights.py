@@ -27,6 +27,7 @@ from relume.live.free_camera.lobe_coverage import lobe_coverage, nearest_point
 from relume.live.free_camera.normal_mapping import normalize
 from relume.look.model import Rgb
 from relume.math.fast_math import acos_clamped
+from relume.math.plane_rounding import end_offsets
 from relume.raytrace.lobe_directions import LobePattern, angle_at_quantile, lobe_density, lobe_direction, ray_jitter
 from relume.raytrace.local_light_visibility import shadow_ray
 from relume.raytrace.ray_packet import (
@@ -52,7 +53,8 @@ _PI = np.float32(math.pi)
 _LEAST_JITTERS, _JITTERS_OF_EQUAL, _MOST_JITTERS = np.float32(8), np.float32(16), 64
 _MOST_COVERAGES = 16  # normals of a pixel at which the share of a triangle is evaluated
 _DIRECTION_SEED = np.uint32(0x27D4EB2F)
-_MOST_TRIANGLES, _LEAST_AREA = 128, 1e-12  # of an area light; m²
+_MOST_TRIANGLES, _LEAST_AREA = 128, 1e-12  # of an area light; area relative to its largest triangle
+_TINY = 1e-300
 _POINT_RADIUS = np.float32(2e-4)  # of a light without an extent, radians
 
 
@@ -61,7 +63,9 @@ class LobeEmitter(NamedTuple):
 
     Attributes:
         light, strata: the light, with one sample if it has no surface.
-        triangles: of its surface, meters; empty for none. normal: unit, of each. radiance: relative to the emission.
+        triangles: of its surface, meters; empty for none. normal: unit, of each.
+        end_offset: of ray ends from each, see `relume.math.plane_rounding.end_offsets`.
+        radiance: relative to the emission.
         center, radius: of a sphere around the triangles, meters.
     """
 
@@ -69,6 +73,7 @@ class LobeEmitter(NamedTuple):
     strata: LightStrata
     triangles: Shaped[F32, "T 3 3"]
     normal: Shaped[F32, "T 3"]
+    end_offset: Shaped[F32, "T 2"]
     radiance: Shaped[F32, " T"]
     center: Shaped[F32, " 3"]
     radius: np.float32
@@ -83,8 +88,8 @@ class LobeEmitter(NamedTuple):
         power, triangles = _halves(light, strata)
         normal = np.cross(triangles[..., 1, :] - triangles[..., 0, :], triangles[..., 2, :] - triangles[..., 0, :])
         length = np.linalg.norm(normal, axis=2)
-        radiance = light.area * power / np.maximum(length.sum(axis=0) / 2, _LEAST_AREA)
-        is_there = length > 2 * _LEAST_AREA
+        radiance = light.area * power / np.maximum(length.sum(axis=0) / 2, _TINY)
+        is_there = length > _LEAST_AREA * length.max(initial=0)
         corners, normal = triangles[is_there], normal[is_there] / length[is_there, None]
         center = corners.reshape(-1, 3).mean(axis=0) if len(corners) else np.zeros(3)
         return cls(
@@ -92,6 +97,7 @@ class LobeEmitter(NamedTuple):
             strata,
             triangles=np.ascontiguousarray(corners, np.float32),
             normal=np.asarray(normal, np.float32),
+            end_offset=end_offsets(corners),
             radiance=np.broadcast_to(radiance, length.shape)[is_there].astype(np.float32),
             center=np.asarray(center, np.float32),
             radius=np.float32(np.linalg.norm(corners - center, axis=2).max(initial=0)),
@@ -240,12 +246,12 @@ def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environme
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, gain, offset, start, stop, out):  # type: ignore[no-untyped-def]
+def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, gain, start, stop, out):  # type: ignore[no-untyped-def]
     """Add a light without a surface at points [start, stop).
 
     Args:
         tracer: of shadows. emitter: `LobeEmitter`. gain: on its unit emission. (3,)
-        offset: of ray ends from surfaces, meters. out: added to. (n, 3)
+        out: added to. (n, 3)
     """
     packet, irradiance = new_packet(tracer), np.empty(LANES, np.float32)
     for first in range(start, stop, LANES):
@@ -253,7 +259,7 @@ def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, ga
         for lane in range(width):
             p = first + lane
             x, y, z = points.position[p, 0], points.position[p, 1], points.position[p, 2]
-            dx, dy, dz, distance, weight, nx, ny, nz = light_sample(
+            dx, dy, dz, distance, weight, nx, ny, nz, lift = light_sample(
                 emitter.light, emitter.strata, 0, _ZERO, _ZERO, x, y, z
             )
             irradiance[lane], spread = 0, half_vector_spread(footprint, p)
@@ -262,7 +268,7 @@ def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, ga
                 irradiance[lane] = weight * _mean_density(
                     points, p, wo, footprint, pattern, widths, (dx, dy, dz), _POINT_RADIUS, spread, chord
                 )
-            along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, offset)
+            along_x, along_y, along_z, far = shadow_ray(dx, dy, dz, distance, nx, ny, nz, lift)
             set_origin(packet, lane, x, y, z)
             set_direction(packet, lane, along_x, along_y, along_z, far)
             num_lit += irradiance[lane] > 0
@@ -313,12 +319,12 @@ def _mean_coverage(points, p, wo, footprint, pattern, widths, triangle):  # type
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_triangle(packet, points, wo, footprint, pattern, widths, emitter, t, gain, offset, first, width, lit, out):  # type: ignore[no-untyped-def]
+def _add_triangle(packet, points, wo, footprint, pattern, widths, emitter, t, gain, first, width, lit, out):  # type: ignore[no-untyped-def]
     """Add a triangle of an area light at points [first, first + width).
 
     Args:
         packet: of shadow rays. t: the triangle. lit: points whose lobe may meet the light. (lanes,)
-        emitter, gain, offset, out: as in `_add_small_light`.
+        emitter, gain, out: as in `_add_small_light`.
     """
     triangle, normal, num_lit = emitter.triangles[t], emitter.normal[t], 0
     coverage = np.zeros(LANES, np.float32)
@@ -336,7 +342,9 @@ def _add_triangle(packet, points, wo, footprint, pattern, widths, emitter, t, ga
         if coverage[lane] > 0:
             num_lit += 1
             x, y, z = nearest_point(triangle, normal, position, mirror_direction(points, p, wo))
-            lift = offset if facing > 0 else -offset
+            span = math.sqrt((x - position[0]) ** 2 + (y - position[1]) ** 2 + (z - position[2]) ** 2)
+            lift = emitter.end_offset[t, 0] + emitter.end_offset[t, 1] * np.float32(span)
+            lift = lift if facing > 0 else -lift
             set_origin(packet, lane, position[0], position[1], position[2])
             set_direction(
                 packet, lane, x + lift * normal[0] - position[0], y + lift * normal[1] - position[1],
@@ -354,7 +362,7 @@ def _add_triangle(packet, points, wo, footprint, pattern, widths, emitter, t, ga
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_area_light(tracer, points, wo, footprint, pattern, widths, emitter, gain, offset, start, stop, out):  # type: ignore[no-untyped-def]
+def _add_area_light(tracer, points, wo, footprint, pattern, widths, emitter, gain, start, stop, out):  # type: ignore[no-untyped-def]
     """Add an area light at points [start, stop). Arguments as in `_add_small_light`."""
     packet, lit = new_packet(tracer), np.zeros(LANES, np.uint8)
     for first in range(start, stop, LANES):
@@ -364,9 +372,7 @@ def _add_area_light(tracer, points, wo, footprint, pattern, widths, emitter, gai
             num_lit += lit[lane]
         if num_lit > 0:
             for t in range(emitter.triangles.shape[0]):
-                _add_triangle(
-                    packet, points, wo, footprint, pattern, widths, emitter, t, gain, offset, first, width, lit, out
-                )
+                _add_triangle(packet, points, wo, footprint, pattern, widths, emitter, t, gain, first, width, lit, out)
 
 
 def add_direct_lights(
@@ -387,14 +393,13 @@ def add_direct_lights(
     """
     tracer = scene.geometry.embree.shadow_tracer(coherent=True)
     args = tracer, receivers.points, receivers.wo, footprint, pattern, lobe_widths(pattern)
-    offset = np.float32(scene.surfaces.offset)
     lights = [(each, np.array(gain, np.float32)) for each, gain in emitters]
 
     def kernel(start: int, stop: int) -> None:
         _add_bright_lights(*args, environment, start, stop, radiance)
         for emitter, gain in lights:
             add_light = _add_area_light if emitter.light.kind == SURFACE else _add_small_light
-            add_light(*args, emitter, gain, offset, start, stop, radiance)
+            add_light(*args, emitter, gain, start, stop, radiance)
 
     parallel_for_chunks(kernel, receivers.points.num_points)
 

@@ -21,6 +21,7 @@ from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.probes.triangle_grids import ProbeGrid, node_index
+from relume.raytrace.ray_origins import OriginMesh, ray_origin
 from relume.raytrace.ray_packet import (
     LANES,
     enable_first_lanes,
@@ -41,23 +42,13 @@ class _GridGeometry(NamedTuple):
     """Grids of faces, as arrays for kernels; see `OcclusionMesh`."""
 
     probe_grid: ProbeGrid
-    positions: F32
-    faces: NDArray[np.uint32]
-    face_normal: F32
-    edge_offset: F32
-    surface_offset: np.float32
+    origins: OriginMesh
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _point_on_face(geometry, f, side, u, v, point):  # type: ignore[no-untyped-def]
     """Write a point in a face, offset from its surface and edges, where it would lie in other faces. point: (3,)"""
-    w = max(np.float32(1) - u - v, geometry.edge_offset[f, 0])
-    u, v = max(np.float32(u), geometry.edge_offset[f, 1]), max(np.float32(v), geometry.edge_offset[f, 2])
-    a, b, c = geometry.faces[f, 0], geometry.faces[f, 1], geometry.faces[f, 2]
-    lift = -geometry.surface_offset if side == 1 else geometry.surface_offset
-    for axis in range(3):
-        x, y, z = geometry.positions[a, axis], geometry.positions[b, axis], geometry.positions[c, axis]
-        point[axis] = (w * x + u * y + v * z) / (w + u + v) + lift * geometry.face_normal[f, axis]
+    point[0], point[1], point[2] = ray_origin(geometry.origins, f, u, v, -1 if side == 1 else 1)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -121,9 +112,7 @@ def find_occluded_probes(mesh: OcclusionMesh) -> Shaped[NDArray[np.uint8], " nod
 
 
 def _grid_geometry(mesh: OcclusionMesh) -> _GridGeometry:
-    stored_scene = mesh.stored_scene
-    face_arrays = stored_scene.faces, stored_scene.face_normal, mesh.edge_offset
-    return _GridGeometry(stored_scene.probe_grid, mesh.positions, *face_arrays, np.float32(mesh.surface_offset))
+    return _GridGeometry(mesh.stored_scene.probe_grid, mesh.origins)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -144,7 +133,7 @@ def _reweight(tracer, geometry, has_occluded_neighbor, gbuffer, start, stop):  #
     """Trace to the nodes of rays [start, stop) that have a node with an occluded neighbor."""
     packet, num_pending, (face, uv, _), directions = new_packet(tracer), 0, gbuffer.hits, gbuffer.directions
     lattice_node, weight = gbuffer.lattice_node, gbuffer.weight
-    origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.face_normal
+    origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.origins.normal
     for p in range(start, stop):
         f = face[p]
         if f < 0 or not (

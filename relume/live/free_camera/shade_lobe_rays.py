@@ -27,6 +27,7 @@ from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.shade_pixels import blend, interpolate_uv, perturbed_normal, texture_footprint
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, PixelSource, lobe_radiance
 from relume.probes.stored_scene import StoredScene
+from relume.raytrace.ray_origins import ray_origin
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.surface_textures import NORMAL_MAP
 from relume.raytrace.texture_kernels import sample_texture
@@ -42,11 +43,11 @@ I32 = NDArray[np.int32]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _find_points(scene, gbuffer, camera_position, offset, pixel_angle, rows, start, stop, points, wo):  # type: ignore[no-untyped-def]
+def _find_points(scene, gbuffer, origins, pixel_angle, rows, start, stop, points, wo):  # type: ignore[no-untyped-def]
     """Write the points of rays rows[start:stop], with mapped normals.
 
     Args:
-        scene: `PixelArrays`. gbuffer: `GBuffer`. camera_position: meters. offset: of origins from surfaces, meters.
+        scene: `PixelArrays`. gbuffer: `GBuffer`. origins: `OriginMesh` of the triangles.
         pixel_angle: angle of a pixel, radians. points: `SurfacePoints`, written. wo: written. (n, 3)
     """
     textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene
@@ -73,9 +74,10 @@ def _find_points(scene, gbuffer, camera_position, offset, pixel_angle, rows, sta
                 (uv[p, 0], uv[p, 1]), n, outward, view_cosine > 0, scratch,
             )  # fmt: skip
         t, _ = tangents_of(n)
-        lift = -offset if view_cosine > 0 else offset
+        side = -1 if view_cosine > 0 else 1
+        x, y, z = ray_origin(origins, f, uv[p, 0], uv[p, 1], side)
+        points.position[i, 0], points.position[i, 1], points.position[i, 2] = x, y, z
         for axis in range(3):
-            points.position[i, axis] = camera_position[axis] + distance[p] * d[axis] + lift * outward[axis]
             points.normal[i, axis], points.tangent[i, axis], wo[i, axis] = n[axis], t[axis], -d[axis]
         points.seed[i] = p
 
@@ -186,10 +188,10 @@ def _add_lobe(
     """
     assert lobe is not None
     scene_args, (width, height) = (stored_scene.pixel_arrays(), gbuffer), image.size
-    position, pixel_angle = camera.to_world[:3, 3].astype(np.float32), np.float32(camera.yfov / height)
-    wo, origins, normals, tangents = np.empty((4, len(rows), 3), np.float32)
-    points = SurfacePoints(origins, normals, tangents, np.empty(len(rows), np.uint32))
-    point_args = *scene_args, position, np.float32(lobe_scene.surfaces.offset), pixel_angle, rows
+    pixel_angle = np.float32(camera.yfov / height)
+    wo, positions, normals, tangents = np.empty((4, len(rows), 3), np.float32)
+    points = SurfacePoints(positions, normals, tangents, np.empty(len(rows), np.uint32))
+    point_args = *scene_args, lobe_scene.surfaces.origins, pixel_angle, rows
     parallel_for_chunks(lambda start, stop: _find_points(*point_args, start, stop, points, wo), len(rows))
     receivers = ShadingPoints(points, wo, np.empty((len(rows), 0), np.uint8))
     footprint = pixel_footprint(image.pixel, width, points, wo) if width else NO_FOOTPRINT

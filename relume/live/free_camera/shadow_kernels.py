@@ -16,6 +16,7 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.sun_disks import NUM_TARGETS
 from relume.live.free_camera.antialiasing import is_edge
 from relume.raytrace.camera_rays import Hits
+from relume.raytrace.ray_origins import OriginMesh, ray_origin
 from relume.raytrace.ray_packet import (
     FAR,
     LANES,
@@ -39,45 +40,24 @@ _ORDER = np.array([0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15], np.int
 class ShadowRays(NamedTuple):
     """Hits of camera rays, as arrays for kernels."""
 
-    positions: F32
-    edge_offset: F32
-    faces: NDArray[np.uint32]
+    origins: OriginMesh
     material: NDArray[np.int32]
-    face_normal: F32
     hits: Hits
     directions: F32
     right: F32
     up: F32
-    surface_offset: np.float32
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _shadow_origin(rays, p, at):  # type: ignore[no-untyped-def]
-    """Write the hit point, offset from its surface, and the face normal on its side. at: (3, 3), the last row is
-    scratch
-    """
-    f, along, barycentric = rays.hits.face[p], np.float32(0), at[2]
-    a, b, c = rays.faces[f, 0], rays.faces[f, 1], rays.faces[f, 2]
-    barycentric[0], barycentric[1], barycentric[2] = (
-        np.float32(1) - rays.hits.uv[p, 0] - rays.hits.uv[p, 1],
-        rays.hits.uv[p, 0],
-        rays.hits.uv[p, 1],
-    )
+    """Write the hit point, offset from its surface, and the face normal on its side. at: (2, 3)"""
+    f, along = rays.hits.face[p], np.float32(0)
     for axis in range(3):
-        along += rays.face_normal[f, axis] * rays.directions[p, axis]
-    # at the edge of two walls, a point on one would lie in the plane of the other and look behind it
-    total = np.float32(0)
-    for k in range(3):
-        barycentric[k] = max(barycentric[k], rays.edge_offset[f, k])
-        total += barycentric[k]
-    sign = np.float32(-1) if along > 0 else np.float32(1)
+        along += rays.origins.normal[f, axis] * rays.directions[p, axis]
+    side = np.float32(-1) if along > 0 else np.float32(1)
+    at[0, 0], at[0, 1], at[0, 2] = ray_origin(rays.origins, f, rays.hits.uv[p, 0], rays.hits.uv[p, 1], side)
     for axis in range(3):
-        at[1, axis] = sign * rays.face_normal[f, axis]
-        at[0, axis] = (
-            barycentric[0] * rays.positions[a, axis]
-            + barycentric[1] * rays.positions[b, axis]
-            + barycentric[2] * rays.positions[c, axis]
-        ) / total + rays.surface_offset * at[1, axis]
+        at[1, axis] = side * rays.origins.normal[f, axis]
     return -abs(along)
 
 
@@ -106,7 +86,7 @@ def trace_single_target(tracer, rays, targets, ray_indices, width, start, stop, 
         tracer: of shadow rays. rays: of the camera. targets: of the light. ray_indices: the rays. (m,)
         width: of the image, pixels. start, stop: the range. num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
     """
-    packet, at = new_packet(tracer), np.empty((3, 3), np.float32)
+    packet, at = new_packet(tracer), np.empty((2, 3), np.float32)
     is_above = np.zeros(LANES, np.bool_)
     for batch_start in range(start, stop, LANES):
         batch_size = min(LANES, stop - batch_start)
@@ -134,7 +114,7 @@ def trace_all_targets(tracer, rays, targets, ray_indices, is_edge, width, start,
         tracer, rays, targets, ray_indices, width, start, stop: as in `trace_single_target`.
         is_edge: pixels on an edge. (pixels,) num_visible: written, number of visible targets. (rays,) uint8
     """
-    packet, at = new_packet(tracer), np.empty((3, 3), np.float32)
+    packet, at = new_packet(tracer), np.empty((2, 3), np.float32)
     is_above, step = np.zeros(LANES, np.bool_), np.empty((2, 3), np.float32)
     for index in range(start, stop):
         p = ray_indices[index]
@@ -169,7 +149,7 @@ def trace_all_targets(tracer, rays, targets, ray_indices, is_edge, width, start,
 @nb.njit(nogil=True, cache=True, inline="always")
 def _is_same_surface(rays, p, q):  # type: ignore[no-untyped-def]
     """Return whether two pixels show one surface."""
-    return rays.hits.face[q] >= 0 and not is_edge(rays.material, rays.face_normal, rays.hits, rays.directions, p, q)
+    return rays.hits.face[q] >= 0 and not is_edge(rays.material, rays.origins.normal, rays.hits, rays.directions, p, q)
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)

@@ -41,7 +41,6 @@ from relume.probes.stored_scene import StoredScene, ray_pattern, read_stored_sce
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.interior import Obstacle, Surroundings, find_surroundings, first_obstacle, interior_camera
-from relume.raytrace.scene_buffers import ray_epsilon
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility import select_visibility
 from relume.scene.model import Camera
@@ -182,13 +181,9 @@ class BakedFreeCamera:
         bounds = next(iter(self.views.values())).bounds
         return interior_camera(self.embree, self.stored_scene.face_normal, bounds, "inside")
 
-    @cached_property
-    def _ray_epsilon(self) -> float:
-        return float(ray_epsilon(self.positions))
-
     def first_obstacle(self, path: Shaped[NDArray[np.float64], "points 3"]) -> Obstacle | None:
         """Find the first surface on a path. path: corners of a polyline, meters"""
-        return first_obstacle(self.embree, path, self._ray_epsilon)
+        return first_obstacle(self.embree, self.occlusion_mesh.origins, path)
 
     def surroundings(self, position: Shaped[NDArray[np.float64], " 3"]) -> Surroundings:
         """Find the surfaces around a point. position: meters"""

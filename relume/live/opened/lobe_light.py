@@ -149,7 +149,6 @@ class LobeTracer:
         num_bands = np.array([lobe.band_density.shape[1] for lobe, _ in found], np.float32)
         median = np.array([lobe.median[0] for lobe, _ in found], np.float32)
         return LobeSurfaces(
-            faces=geometry.faces,
             face_material=geometry.face_material,
             normals=self.normals,
             curvature=self._curvature,
@@ -167,7 +166,7 @@ class LobeTracer:
             specular=row_of_slot(textures.slots, TEXTURES.index("specular")),
             glass=self._glass,
             is_two_sided=np.array(self._store.attributes["double_sided"], np.bool_),
-            offset=geometry.epsilon,
+            origins=geometry.origins,
         )
 
     def _replace_textures(self, images: HitImages) -> HitTextures:

@@ -31,7 +31,7 @@ from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.emission_image import ImageEmitter, image_emitter
 from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
 from relume.raytrace.moving_light import MovingLight, trace_moving_light
-from relume.raytrace.scene_buffers import is_front, ray_epsilon
+from relume.raytrace.scene_buffers import is_front
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.shading_points import LocalRays
@@ -87,10 +87,6 @@ class LocalLights:
         """Acceleration structure of the triangles."""
         return EmbreeScene.build(self.positions, self.faces, read_alpha_test(self._store, self.positions, self.faces))
 
-    @cached_property
-    def _ray_offset(self) -> float:
-        return ray_epsilon(self.positions)
-
     def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
         """Return the number of samples of a light, given that of a rectangle; see `make_light_strata`.
 
@@ -142,7 +138,7 @@ class LocalLights:
 
     def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
         """Preview a light of unit emission at points, with few samples if it has an extent."""
-        return trace_moving_light(self.embree, self._ray_offset, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
+        return trace_moving_light(self.embree, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
 
     def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
         """Return rays of a previewed light, for directional terms. visible: `MovingLight.visible`"""
@@ -186,7 +182,7 @@ class LocalLights:
         Args:
             geometry: geometry of the light. points: receivers. num_samples: from `LocalLights.num_samples`.
         """
-        return trace_light_visibility(self.embree, self._ray_offset, *self.sample_light(geometry, num_samples), points)
+        return trace_light_visibility(self.embree, *self.sample_light(geometry, num_samples), points)
 
     def sample_light(self, geometry: LightGeometry, rectangle_samples: int) -> tuple[LocalLight, LightStrata]:
         """Build a light and its samples; see `make_light_strata`."""

@@ -17,7 +17,7 @@ from relume.methods.store_layout import read_shadow_ray_directions
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import PatchTree
 from relume.raytrace.gather_rays import RayPattern
-from relume.raytrace.scene_buffers import SceneBuffers, ray_epsilon
+from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility import trace_visibility
 from relume.store.bake_protocol import StoreReader
@@ -92,6 +92,4 @@ class NormalRetracer:
         except StoreError:
             raise StoreError("this bake is too old to show normal map overrides; bake the scene again") from None
         normals, tangents, uvs = (np.empty((0, k), np.float32) for k in (3, 4, 2))
-        return SceneBuffers(
-            positions, normals, tangents, uvs, faces, material, mesh, self._local.embree, ray_epsilon(positions)
-        )
+        return SceneBuffers(positions, normals, tangents, uvs, faces, material, mesh, self._local.embree)

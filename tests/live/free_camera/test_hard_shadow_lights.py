@@ -16,6 +16,7 @@ from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.raytrace.ray_origins import ray_origins
 from relume.raytrace.visibility import trace_visibility
 from relume.scene.model import Material
 from relume.store.bake_protocol import Recipe
@@ -97,12 +98,13 @@ def test_visible_fractions_equal_those_of_all_shadow_rays(sunlit):
     gbuffer, solid = picture._current_gbuffer(), sunlit.occlusion_mesh
     (hard_light,) = sunlit.hard_shadow_lights(picture._current_light(), None)
     fractions = visible_fractions(solid, gbuffer, CAMERA, SIZE, hard_light.targets)
-    face, position = gbuffer.hits.face, CAMERA.to_world[:3, 3] + gbuffer.hits.distance[:, None] * gbuffer.directions
+    face = gbuffer.hits.face
     normal = solid.stored_scene.face_normal[face] * -np.sign(
         np.einsum("nc,nc->n", solid.stored_scene.face_normal[face], gbuffer.directions)
     )[:, None].astype(np.float32)
     hits = np.flatnonzero(face >= 0)
-    origins = (position + solid.surface_offset * normal)[hits].astype(np.float32)
+    is_inner = np.einsum("nc,nc->n", normal, solid.stored_scene.face_normal[face])[hits] < 0
+    origins = ray_origins(solid.origins, face[hits], gbuffer.hits.uv[hits], is_inner).position
     towards = np.ascontiguousarray(hard_light.targets.towards.reshape(-1, 3))
     bits = trace_visibility(sunlit.embree, origins, np.ascontiguousarray(normal[hits]), towards).visible
     expected = np.zeros(len(face))
