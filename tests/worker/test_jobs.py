@@ -244,6 +244,38 @@ def test_job_that_waits_for_disk_space_says_so(tmp_path: Path, ledger: Ledger) -
     assert jobs.frames.get(identity).problem is None
 
 
+def test_leases_that_cannot_be_renewed_are_logged_once_until_they_are(
+    tmp_path: Path, ledger: Ledger, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A full disk can be read: polling the queue succeeds meanwhile."""
+    monkeypatch.setattr("relume_worker.jobs.job_service.RENEW_S", 0.001)
+    monkeypatch.setattr("relume_worker.jobs.job_service.POLL_INTERVAL_S", 0.001)
+    service, num_renewals, num_polls, is_full = Jobs(ledger, tmp_path, Machine()).service, 0, 0, True
+
+    def claimable(*_: object) -> list[Waiting]:
+        nonlocal num_polls
+        num_polls += 1
+        return []
+
+    def renew_leases() -> None:
+        nonlocal num_renewals
+        num_renewals += 1
+        if is_full:
+            raise DiskFullError("the database")
+
+    monkeypatch.setattr(service.ledger, "claimable", claimable)
+    monkeypatch.setattr(service.ledger, "renew_leases", renew_leases)
+    service._runs["a"] = Waiting("a", "ann", False, 1.0), threading.Thread()
+    service.start()
+    wait_for(lambda: min(num_renewals, num_polls) >= 5)
+    messages = [record.getMessage().split(" (")[0] for record in caplog.records]
+    is_full, num_renewals = False, 0
+    wait_for(lambda: num_renewals >= 3)
+    service.close()
+    assert messages == ["the leases of jobs cannot be renewed"]
+    assert [record.getMessage() for record in caplog.records[1:]] == ["the leases of jobs cannot be renewed: resolved"]
+
+
 def test_frames_of_one_job_take_all_slots(tmp_path: Path, ledger: Ledger) -> None:
     machine = Machine(3)
     jobs = Jobs(ledger, tmp_path, machine, num_slots=3)
