@@ -38,6 +38,7 @@ from relume_server.auth.middleware import AuthMiddleware
 from relume_server.auth.rules import methods_at
 from relume_server.conditional_requests import Conditional
 from relume_server.idempotency import Idempotency
+from relume_server.io.large_documents import DOCUMENTS_AT_ONCE, LargeDocumentMiddleware
 from relume_server.io.upload_middleware import UPLOADS_AT_ONCE, UPLOADS_EACH, UploadMiddleware
 from relume_server.lifecycle.connection import Connection
 from relume_server.lifecycle.drain import DrainState
@@ -128,6 +129,11 @@ def create_app(
         UploadMiddleware,
         access=lambda: app.state.services.access,
         max_per_user=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
+        weights=settings.fair_shares,
+    )
+    app.add_middleware(
+        LargeDocumentMiddleware,
+        max_per_user=1 if settings.login else DOCUMENTS_AT_ONCE,
         weights=settings.fair_shares,
     )
     app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
