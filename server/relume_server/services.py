@@ -219,7 +219,7 @@ def _open_kinds(settings: Settings, service: BakeService, executor: StepExecutor
 
     return _Kinds(
         RenderJobs(jobs, settings.data, scene_name, partial(access.quotas.set_bytes, "render")),
-        ComparisonJobs(jobs, settings.data),
+        ComparisonJobs(jobs, settings.data, partial(access.quotas.set_bytes, "comparison")),
         BtfJobs(jobs, settings.data, on_btf_ready, on_btf_failed),
     )
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from pydantic import BaseModel
 from sqlalchemy import select, update
 
 from relume.core.errors import CancelledError, DiskFullError, RelumeError
+from relume.store.disk_space import RESERVE_BYTES
 from relume_worker.database import open_database
 from relume_worker.database.models import JobRow
 from relume_worker.jobs.fair_share import FairShare, Waiting
@@ -322,6 +324,30 @@ def test_failed_step_fails_the_job_and_the_rest_resumes(tmp_path: Path, ledger: 
     jobs.service.close()
     assert before < 6
     assert len(machine.done) == 6, "finished frames are not rendered again"
+
+
+def test_job_whose_disk_fills_up_fails_and_resumes(
+    tmp_path: Path, ledger: Ledger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = Machine()
+    jobs = Jobs(ledger, tmp_path, machine)
+
+    def free(path: Path) -> SimpleNamespace:
+        return SimpleNamespace(free=RESERVE_BYTES - (len(machine.done) == 2))
+
+    monkeypatch.setattr("shutil.disk_usage", free)
+    jobs.service.start()
+    identity = jobs.submit("a", num=4)
+    jobs.wait(identity, "failed")
+    assert jobs.frames.get(identity).problem == (
+        "the files of a render cannot be written, the disk is full; free some space, then try again"
+    )
+    assert sorted(path.name for path in (tmp_path / identity).glob("[0-9]")) == ["0", "1"]
+    machine.done.append("deleted files")
+    jobs.frames.resume(identity)
+    jobs.wait(identity)
+    jobs.service.close()
+    assert machine.done == ["a", "a", "deleted files", "a", "a"]
 
 
 @pytest.mark.parametrize("end", ["stop", "delete", "close"])
