@@ -4,6 +4,7 @@ import errno
 import logging
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import pytest
@@ -15,7 +16,7 @@ from session_client import Baked
 from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
 from relume.store.disk_space import RESERVE_BYTES
 from relume_server.batch.cluster_steps import _answer
-from relume_server.errors import make_problem
+from relume_server.errors import NearlyFullError, make_problem
 from relume_server.io import import_request
 from relume_server.io.import_request import ImportRequest, run_import
 from relume_server.settings import Settings
@@ -48,9 +49,29 @@ def test_damaged_database_is_one_sentence_and_one_log_line(
     assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
 
 
+def test_readiness_is_checked_once_a_second_for_all_callers(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    num_checks = 0
+
+    def check_room() -> None:
+        nonlocal num_checks
+        num_checks += 1
+        raise NearlyFullError("full")
+
+    monkeypatch.setattr("relume_server.runtime.recent_check.MAX_AGE_S", 1e9)
+    monkeypatch.setattr(client.app.state.services.access.quotas, "check_room", check_room)  # type: ignore[attr-defined]
+    with ThreadPoolExecutor(5) as threads:
+        assert [*threads.map(lambda _: client.get("/readyz").status_code, range(50))] == [507] * 50
+    assert num_checks == 1
+    monkeypatch.setattr("relume_server.runtime.recent_check.MAX_AGE_S", 0.0)
+    assert (client.get("/readyz").status_code, num_checks) == (507, 2)
+
+
 def test_nearly_full_disk_is_not_ready_and_logged_once(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
+    monkeypatch.setattr("relume_server.runtime.recent_check.MAX_AGE_S", 0.0)
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
     answer = client.get("/readyz")
     assert (answer.status_code, answer.json()["title"]) == (507, "Disk is nearly full")
