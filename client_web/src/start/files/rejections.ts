@@ -4,7 +4,7 @@ import { endsWith, isImportable, isSceneFile, MEASURED_SUFFIXES } from "./sceneF
 
 /** Unsupported formats of measured materials. */
 const OTHER_MEASURED_SUFFIXES = [".merl", ".mbdf"];
-const UNSUPPORTED_SCENE_SUFFIXES = [
+export const UNSUPPORTED_SCENE_SUFFIXES = [
   ".fbx",
   ".blend",
   ".usd",
@@ -12,7 +12,6 @@ const UNSUPPORTED_SCENE_SUFFIXES = [
   ".usdc",
   ".usdz",
   ".dae",
-  ".stl",
   ".3ds",
   ".max",
   ".abc",
@@ -33,7 +32,7 @@ function listFileNames(files: readonly DroppedFile[]): string {
 
 const MEASURED_MESSAGE =
   "Open a scene and drop measured materials on the Library: MERL (.binary), RGL (.bsdf), Cornell (.brdf) or BTF (.btf, .zip).";
-const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY or ZIP.";
+const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY, STL or ZIP.";
 
 /** Advice for rejected files, by the type of the first. */
 function rejectionReason([first]: readonly DroppedFile[], fallback: string): string {
