@@ -81,6 +81,12 @@ ROUTE_GROUPS = (
 )
 
 
+PING_INTERVAL_S = 5.0
+"""Interval of pings: of participants whose network is gone, others learn in this time plus the timeout."""
+PING_TIMEOUT_S = 20.0
+"""Time to answer a ping, which waits behind the frames in flight: for a large one of 2.5 MB, a link of 1 Mbit/s."""
+
+
 def create_app(
     settings: Settings | None = None,
     *,
@@ -184,6 +190,8 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         http=Connection,
         ws=Socket,
         ws_max_size=MAX_MESSAGE_BYTES,
+        ws_ping_interval=PING_INTERVAL_S,
+        ws_ping_timeout=PING_TIMEOUT_S,
         ws_per_message_deflate=False,  # frames are dense numbers: compression costs more than it saves
         log_config=None,  # configured by `relume_server.telemetry.logs`
         access_log=False,  # would log resume tokens
