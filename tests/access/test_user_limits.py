@@ -104,7 +104,7 @@ class TestBytes:
         assert refused.status_code == 429
         assert refused.json()["type"] == "urn:relume:problem:quota"
         assert "RELUME_MAX_BYTES_PER_USER" in refused.json()["detail"]
-        bake = {"scene": scene, "size": list(SIZE), "lights": 10}
+        bake = {"scene": scene, "method": "direct", "size": list(SIZE), "lights": 10}
         assert client.post("/api/bakes", json=bake, headers=ann).status_code == 429
         assert client.post("/api/bakes", json={**bake, "dry_run": True}, headers=ann).status_code == 200
         assert client.delete(f"/api/scenes/{scene}", headers=ann).status_code == 204
@@ -282,7 +282,7 @@ class TestBakes:
     ) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         scene = client.post("/api/example-scenes/cornell_box", headers=ann).json()["id"]
-        recipes = [{"scene": scene, "size": list(SIZE), "lights": lights} for lights in (10, 20)]
+        recipes = [{"scene": scene, "method": "direct", "size": list(SIZE), "lights": lights} for lights in (10, 20)]
         first = client.post("/api/bakes", json=recipes[0], headers=ann)
         assert first.status_code == 202, first.text
         assert client.post("/api/bakes", json=recipes[0], headers=ann).status_code == 202  # the same recipe

@@ -32,7 +32,7 @@ from relume_worker.paths import btfs_path, images_path
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
-TINY = ["--size", "32x24", "--lights", "100"]
+TINY = ["--method", "direct", "--size", "32x24", "--lights", "100"]
 RED = {"materials": {"White": {"terms": [{"model": "lambert", "color": [1.0, 0.0, 0.0]}]}}}
 BLUE = {"materials": {"White": {"terms": [{"model": "lambert", "color": [0.0, 0.0, 1.0]}]}}}
 
@@ -134,7 +134,7 @@ def test_repeated_bake_prints_one_line_of_json(run: Any) -> None:
 
 
 def test_queued_bake_is_canceled_deleted_and_audited(run: Any, baked: Path) -> None:
-    _, text, _ = run("bake", "quad one", "--size", "24x16", "--lights", "50", "--no-watch")
+    _, text, _ = run("bake", "quad one", "--method", "direct", "--size", "24x16", "--lights", "50", "--no-watch")
     bake = text.strip()
     assert f"{bake}  queued" in run("list", "bakes", "--state", "queued")[1]
     assert run("cancel", bake)[:2] == (0, f"{bake}\n")
