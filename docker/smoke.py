@@ -48,7 +48,7 @@ def import_scene(url: str) -> dict[str, Any]:
 
 def bake_scene(url: str, scene_id: str) -> dict[str, Any]:
     """POST /api/bakes and follow it until it is ready; the bake's body."""
-    recipe = json.dumps({"scene": scene_id, "size": [400, 300], "lights": 1000}).encode()
+    recipe = json.dumps({"scene": scene_id, "method": "direct", "size": [400, 300], "lights": 1000}).encode()
     bake = call(f"{url}/api/bakes", recipe, "application/json")
     deadline = time.monotonic() + BAKE_TIMEOUT_S
     while bake["state"] in ("queued", "running"):

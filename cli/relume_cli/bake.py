@@ -30,7 +30,9 @@ Preset = Literal["preview", "good", "final"]
 
 def bake(
     scene: SceneName,
-    method: Annotated[Method, typer.Option(help="Direct light; gather adds bounces; probes a free camera.")] = "direct",
+    method: Annotated[
+        Method, typer.Option(help="With indirect light; direct: without, faster; probes: free camera.")
+    ] = "gather",
     preset: Annotated[
         Preset, typer.Option(help="Quality: preview 320x240 and 300 lights, good 640x480, 2000, final 1024x768, 4000.")
     ] = "good",

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { DroppedFile } from "../src/start/files/dropTypes";
-import { isImportable, sortFiles, fileBaseName, mergeFiles } from "../src/start/files/sceneFiles";
+import { isImportable, sortFiles, fileBaseName, mergeFiles, SCENE_SUFFIXES } from "../src/start/files/sceneFiles";
+import { startPageRejection, UNSUPPORTED_SCENE_SUFFIXES } from "../src/start/files/rejections";
 import { resolvePath } from "../src/start/files/references";
 import { previewSize, validateRecipe } from "../src/session/scene/recipe";
 
@@ -19,6 +20,24 @@ test("dropped files find their role", async () => {
   expect(files.every(isImportable)).toBe(true);
   expect(isImportable(dropped("notes.txt"))).toBe(false);
   expect(["tea.pot.obj", "plain", "a/b/c.d.glb"].map(fileBaseName)).toEqual(["tea.pot", "plain", "c.d"]);
+});
+
+test("a format is either importable, and named in messages, or unsupported", () => {
+  expect(SCENE_SUFFIXES.filter((suffix) => UNSUPPORTED_SCENE_SUFFIXES.includes(suffix))).toEqual([]);
+  const message = startPageRejection([dropped("a.fbx")])?.toLowerCase() ?? "";
+  const named = (suffix: string) => message.includes(suffix.startsWith(".usd") ? "usd" : suffix.slice(1));
+  expect(SCENE_SUFFIXES.filter((suffix) => !named(suffix))).toEqual([]);
+});
+
+test("a USD layer takes along all layers and images", async () => {
+  const files = [
+    dropped("kit/car.usda"),
+    dropped("kit/parts/wheel.usdc"),
+    dropped("kit/red.png"),
+    dropped("kit/a.bin"),
+  ];
+  const [car] = (await sortFiles(files)).scenes;
+  expect(car?.companions.map(({ path }) => path)).toEqual(["kit/parts/wheel.usdc", "kit/red.png"]);
 });
 
 test("a scene takes along what it names, wherever that lies in the folder, and no more", async () => {

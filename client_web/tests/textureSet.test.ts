@@ -113,12 +113,10 @@ test("a material with a set has all of it at once", () => {
 test("what was dropped on the wrong place is named, with where it belongs", () => {
   const dropped = (path: string) => [{ path, file: file(path) }];
   for (const refusal of [editorRejection, startPageRejection]) {
-    expect(refusal(dropped("cayman.brdf"))).toMatch(
-      /^Can't (use|open) cayman\.brdf.* drop measured materials on the Library/,
-    );
+    expect(refusal(dropped("cayman.brdf"))).toMatch(/^Can't (use|open) cayman\.brdf.* drop materials on the Library/);
     expect(refusal(dropped("car.fbx"))).toMatch(/^Can't (use|open) car\.fbx.*Export a GLB/);
   }
   expect(editorRejection(dropped("car.glb"))).toMatch(/^Can't use car\.glb here\. Import scenes on the start page/);
-  expect(startPageRejection(dropped("gold.binary"))).toMatch(/^Can't open gold\.binary\. .*measured materials/);
+  expect(startPageRejection(dropped("gold.binary"))).toMatch(/^Can't open gold\.binary\. .*drop materials/);
   expect(startPageRejection(dropped("car.glb"))).toBeNull();
 });

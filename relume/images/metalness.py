@@ -30,17 +30,26 @@ from relume.scene_io.gltf.blend import MetallicBlend
 from relume.scene_io.gltf.texture_resampling import Raster
 
 _MIN_F0 = 1e-4
+_HEAD_BYTES = 1 << 16  # of a derived image without its texels
 _MAX_NAME_LENGTH = 60  # of the image's name, in the names of the derived images
 
 
 def with_metalness(
-    folder: Path, terms: Sequence[Document], image: str, scene: str, material: str, read: ReadMaterial
+    folder: Path,
+    terms: Sequence[Document],
+    image: str,
+    scene: str,
+    material: str,
+    read: ReadMaterial,
+    reserve: Callable[[int], object],
 ) -> list[dict[str, Any]]:
     """Apply a metalness image to a material.
 
     Args:
         folder: folder of the image store. terms: terms of the material, complete. image: id of the image.
         scene, material: origin of the terms' texture channels. read: reads that material.
+        reserve: called with an upper bound of the size of the derived images before they are stored; its errors
+            propagate.
     Returns:
         The terms: diffuse terms and highlights have textures that are derived from the image, and f0 is the mean.
     Raises:
@@ -51,6 +60,8 @@ def with_metalness(
     base = find_base_color(terms[diffuse_indices[0]], terms[specular_indices[0]], scene, material, read)
     record = get_record(folder, image)
     blend = _blend(base, load_texture(record.texture))
+    height, width = blend.raster.size
+    reserve(2 * (3 * height * width + _HEAD_BYTES))
     _, highest, mean, _ = blend.f0_and_f90()
     mean = np.maximum(mean, _MIN_F0)
 

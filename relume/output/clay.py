@@ -74,7 +74,9 @@ def _occlusion(
     """Ambient occlusion: mean of 1 − distance / radius over cosine-distributed rays that hit a surface within it."""
     num_patterns = _PATTERNS * _SUPERSAMPLING**2
     sphere = sphere_directions(_RAYS_PER_SAMPLE * num_patterns)
-    lifted = origin + (geometry.epsilon + 1e-3 * radius[:, None]) * normal
+    # above the facets of smooth surfaces, and the rounding of the hits
+    height = np.float32(1e-3) * radius + np.float32(2**-20) * np.abs(origin).max(axis=1)
+    lifted = origin + height[:, None] * normal
     occlusion = np.zeros(len(origin), np.float32)
     for ray in range(_RAYS_PER_SAMPLE):
         # cosine-distributed: the normal plus a point on the unit sphere

@@ -30,6 +30,7 @@ _BLOCKS = (1, 4, 16)  # block sizes, pixels
 _NUM_SIGN_FLIPS = 16  # trials with flipped signs
 _SEED = 1995
 _MAX_BATCHES, _MIN_BATCHES, _BATCH_BYTES = 16, 4, 256 << 20
+_IMAGE_BYTES = 12  # per pixel
 _ROUNDING = 1e-6  # relative rounding of float32, not counted as a difference
 _FULL_COLOR_STOPS = 0.25
 _DARK = 0.01  # of the image's mean; stops are meaningless below it
@@ -50,10 +51,13 @@ class Estimate:
 
     @classmethod
     def empty(cls, height: int, width: int) -> Estimate:
-        """Make an estimate without passes; memory bounds the number of batches."""
-        num_fitting = _BATCH_BYTES // max(1, 12 * height * width)
-        num = min(max(num_fitting, _MIN_BATCHES), _MAX_BATCHES)
-        return cls(np.zeros((num, height, width, 3), np.float32), 0)
+        """Make an estimate without passes."""
+        return cls(np.zeros((_num_batches(height, width), height, width, 3), np.float32), 0)
+
+    @staticmethod
+    def planned_bytes(height: int, width: int) -> int:
+        """Size of the sums of an image."""
+        return _num_batches(height, width) * _IMAGE_BYTES * height * width
 
     def add(self, picture: Shaped[F32, "height width 3"]) -> Estimate:
         """Add a pass; the new estimate reuses the arrays of this one."""
@@ -71,6 +75,11 @@ class Estimate:
     def mean(self) -> Shaped[F32, "height width 3"]:
         """Mean of all passes."""
         return np.asarray(self.sums.sum(axis=0, dtype=np.float64) / self.passes, np.float32)
+
+
+def _num_batches(height: int, width: int) -> int:
+    """Number of batches, which memory bounds."""
+    return min(max(_BATCH_BYTES // max(1, _IMAGE_BYTES * height * width), _MIN_BATCHES), _MAX_BATCHES)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Disk space checks during bakes: a plan is no bound on disk use, so large writes check the free space first."""
+"""Disk space checks during jobs: a plan is no bound on disk use, so large writes check the free space first."""
 
 from __future__ import annotations
 
@@ -15,10 +15,14 @@ RESERVE_BYTES = 64 << 20  # left for the server's own files and for the system
 _BUFFER_BYTES = 1 << 20
 
 
-def check_disk_space(folder: Path) -> None:
-    """Raise DiskFullError if a bake must stop: without the reserve, the database could not even delete entries."""
-    if shutil.disk_usage(folder).free < RESERVE_BYTES:
-        raise DiskFullError("the store of a bake")
+def check_disk_space(folder: Path, num_bytes: int = 0, label: str = "the store of a bake") -> None:
+    """Raise DiskFullError if a job must stop: without the reserve, the database could not even delete entries.
+
+    Args:
+        folder: on the disk to check. num_bytes: size of the next write, if known. label: of its files.
+    """
+    if shutil.disk_usage(folder).free - num_bytes < RESERVE_BYTES:
+        raise DiskFullError(label)
 
 
 class _ScratchFile(io.FileIO):

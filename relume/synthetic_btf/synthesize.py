@@ -17,7 +17,7 @@ from relume.assets.btf.compress import MAX_TEXELS, compress
 from relume.assets.btf.direction_rings import ubo_grid
 from relume.assets.btf.local_pca_btf import LocalPcaBtf
 from relume.assets.btf.partial_results import PartialCompression
-from relume.assets.btf.value_cache import ValueFile
+from relume.assets.btf.value_cache import ValueFile, value_bytes
 from relume.core.errors import ParameterError
 from relume.synthetic_btf.corduroy import corduroy
 from relume.synthetic_btf.from_images import ReliefTile
@@ -82,6 +82,11 @@ class SyntheticBtf(NamedTuple):
         if self.geometry not in GEOMETRIES:
             fields["tile"] = _hash_tile(tile)
         return {"synthetic": fields, "seed": _SEED, "light": _LIGHT}
+
+
+def planned_bytes(size: int) -> int:
+    """Size of the rendered values of `size`² texels, beside which the compressed ones are small."""
+    return value_bytes(ubo_grid(), (size, size))
 
 
 def _hash_tile(tile: Tile) -> str:

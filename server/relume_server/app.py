@@ -39,6 +39,7 @@ from relume_server.auth.middleware import AuthMiddleware
 from relume_server.auth.rules import methods_at
 from relume_server.conditional_requests import Conditional
 from relume_server.idempotency import Idempotency
+from relume_server.io.large_documents import DOCUMENTS_AT_ONCE, LargeDocumentMiddleware
 from relume_server.io.upload_middleware import UPLOADS_AT_ONCE, UPLOADS_EACH, UploadMiddleware
 from relume_server.lifecycle.connection import Connection
 from relume_server.lifecycle.drain import DrainState
@@ -81,6 +82,12 @@ ROUTE_GROUPS = (
     login,
     health,
 )
+
+
+PING_INTERVAL_S = 5.0
+"""Interval of pings: of participants whose network is gone, others learn in this time plus the timeout."""
+PING_TIMEOUT_S = 20.0
+"""Time to answer a ping, which waits behind the frames in flight: for a large one of 2.5 MB, a link of 1 Mbit/s."""
 
 
 def create_app(
@@ -133,6 +140,11 @@ def create_app(
         max_per_user=UPLOADS_EACH if settings.login else UPLOADS_AT_ONCE,
         weights=settings.fair_shares,
     )
+    app.add_middleware(
+        LargeDocumentMiddleware,
+        max_per_user=1 if settings.login else DOCUMENTS_AT_ONCE,
+        weights=settings.fair_shares,
+    )
     app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(Conditional)
     app.add_middleware(
@@ -181,6 +193,8 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         http=Connection,
         ws=Socket,
         ws_max_size=MAX_MESSAGE_BYTES,
+        ws_ping_interval=PING_INTERVAL_S,
+        ws_ping_timeout=PING_TIMEOUT_S,
         ws_per_message_deflate=False,  # frames are dense numbers: compression costs more than it saves
         log_config=None,  # configured by `relume_server.telemetry.logs`
         access_log=False,  # would log resume tokens

@@ -21,6 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from relume.assets.measured.merl import FILE_BYTES
 from relume.core.errors import Description, ParameterError, bytes_text
+from relume_server.auth.roles import KEY, Caller
 from relume_server.errors import ForbiddenOriginError, TooLargeError, make_problem, problem_response
 
 # up to the setting: a 4K environment is 25 MB, an 8K one about 100
@@ -29,7 +30,7 @@ UPLOADS = (
     "/api/materials/btf/jobs/geometry",
 )  # fmt: skip
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and its form
-# documents with many looks
+# documents with many looks, of those who may render them
 LARGER = ("/api/renders", "/api/renders/looks")
 MAX_JSON_BYTES = 1024**2
 """Limit of all other bodies. JSON is parsed on the event loop at about 40 MB per second, which blocks all others."""
@@ -143,8 +144,10 @@ class RequestLimits:
             return self._max_upload_bytes
         if path == "/api/materials/measured":
             return MAX_MATERIAL_BYTES
-        max_bytes = self._max_body_bytes if path in LARGER else MAX_LOGIN_BYTES if path in LOGINS else MAX_JSON_BYTES
-        return min(max_bytes, self._max_body_bytes)
+        caller: Caller | None = scope.get(KEY)  # known once the body is read
+        if path in LARGER and (caller is None or caller.may_edit):
+            return self._max_body_bytes
+        return min(MAX_LOGIN_BYTES if path in LOGINS else MAX_JSON_BYTES, self._max_body_bytes)
 
     def _too_large(self, scope: Scope) -> TooLargeError:
         return TooLargeError(f"the request is larger than {bytes_text(self._limit(scope))}; send less")

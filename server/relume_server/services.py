@@ -10,6 +10,7 @@ from functools import partial
 from typing import Annotated, NamedTuple
 
 from fastapi import Depends
+from sqlalchemy import select
 from starlette.requests import HTTPConnection
 
 from relume.assets.environments.built_in import load_built_in
@@ -41,12 +42,14 @@ from relume_server.runtime.cache_evictor import CacheEvictor
 from relume_server.runtime.disk_space import free_bytes
 from relume_server.runtime.executors import Threads
 from relume_server.runtime.protocols import Library
+from relume_server.runtime.recent_check import RecentCheck
 from relume_server.runtime.single_flight import SingleFlight
 from relume_server.session.frames.bake_updates import BakeUpdates
 from relume_server.session.session import SessionServices
 from relume_server.settings import Settings
 from relume_server.telemetry.metrics import Metrics
 from relume_server.telemetry.traces import Traces, open_traces
+from relume_worker.database.models import JobRow
 from relume_worker.jobs.job import Quota
 from relume_worker.jobs.job_ledger import count_jobs
 from relume_worker.jobs.step import StepExecutor
@@ -63,6 +66,7 @@ class Services:
         drain: whether the server is draining. access: users, roles, quotas, and the audit.
         pictures: renders thumbnails, and merges identical concurrent requests.
         responses: large responses.
+        readiness: whether the server can serve.
         import_queue: runs imports, and stores their results.
     """
 
@@ -85,6 +89,7 @@ class Services:
     pictures: SingleFlight
     responses: StreamedResponses
     live: SessionServices
+    readiness: RecentCheck
     import_queue: ImportQueue
 
 
@@ -190,6 +195,7 @@ async def open_services(
             pictures=pictures,
             responses=responses,
             live=_live(settings, metrics, traces, library, threads, service, access, drain, rooms, room_lease),
+            readiness=RecentCheck(partial(_check_ready, service, access)),
             import_queue=ImportQueue(settings, service.ledger, access.quotas, importers),
         )
 
@@ -219,9 +225,16 @@ def _open_kinds(settings: Settings, service: BakeService, executor: StepExecutor
 
     return _Kinds(
         RenderJobs(jobs, settings.data, scene_name, partial(access.quotas.set_bytes, "render")),
-        ComparisonJobs(jobs, settings.data),
+        ComparisonJobs(jobs, settings.data, partial(access.quotas.set_bytes, "comparison")),
         BtfJobs(jobs, settings.data, on_btf_ready, on_btf_failed),
     )
+
+
+def _check_ready(service: BakeService, access: AuthServices) -> None:
+    """Check that the database is readable, and that the disk has room."""
+    with service.ledger.sessions() as session:
+        session.execute(select(JobRow.id).limit(1))
+    access.quotas.check_room()
 
 
 def _live(

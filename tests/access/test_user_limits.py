@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 from btf_zips import zipped
 from fastapi.testclient import TestClient
-from server_fakes import SIZE, FakeMethod, write_tiny_scene
+from server_fakes import SIZE, Control, FakeMethod, write_tiny_scene
 from session_client import Baked
 from sqlalchemy import update
 
@@ -28,6 +30,7 @@ Bearer = Callable[..., dict[str, str]]
 CHANGE = Change("Ann", "edit", "::1", "PUT /api/looks/Red", "/api/looks/Red", 201, "r1")
 
 
+MESH = "v 0 0 0\nv 2 0 0\nv 2 0.1 -2\nv 0 0 -2\nf 1 2 3 4\n"
 SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
 
 
@@ -101,7 +104,7 @@ class TestBytes:
         assert refused.status_code == 429
         assert refused.json()["type"] == "urn:relume:problem:quota"
         assert "RELUME_MAX_BYTES_PER_USER" in refused.json()["detail"]
-        bake = {"scene": scene, "size": list(SIZE), "lights": 10}
+        bake = {"scene": scene, "method": "direct", "size": list(SIZE), "lights": 10}
         assert client.post("/api/bakes", json=bake, headers=ann).status_code == 429
         assert client.post("/api/bakes", json={**bake, "dry_run": True}, headers=ann).status_code == 200
         assert client.delete(f"/api/scenes/{scene}", headers=ann).status_code == 204
@@ -132,6 +135,47 @@ class TestBytes:
         files = (settings.data / "renders" / url.rsplit("/", 1)[1]).iterdir()
         assert access.quotas.used_bytes("Ann") == sum(file.stat().st_size for file in files) > 0
         assert client.delete(url, headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == 0
+
+    def test_comparisons_count_until_their_files_are_deleted(
+        self, client: TestClient, bearer: Bearer, control: Control, access: AuthServices, settings: Settings,
+        baked: Baked,
+    ) -> None:  # fmt: skip
+        settings.max_bytes_per_user = 20_000_000
+        ann, request = bearer("edit", "Ann"), {"bake": baked.bake, "view": "front", "passes": 4}
+        url = client.post("/api/comparisons", json=request, headers=ann).headers["location"]
+        planned = access.quotas.used_bytes("Ann")
+        settings.max_bytes_per_user = 2 * planned - 1
+        refused = client.post("/api/comparisons", json=request, headers=ann)
+        assert (refused.status_code, "comparison or render of yours" in refused.json()["detail"]) == (429, True)
+        control.trace_gate.set()
+        while client.get(url, headers=ann).json()["state"] != "ready":
+            time.sleep(0.01)
+        files = (settings.data / "comparisons" / url.rsplit("/", 1)[1]).iterdir()
+        assert planned > access.quotas.used_bytes("Ann") == sum(file.stat().st_size for file in files) > 0
+        assert client.delete(url, headers=ann).status_code == 204  # only stopped
+        assert access.quotas.used_bytes("Ann") > 0
+        assert client.delete(f"{url}?delete_files=true", headers=ann).status_code == 204
+        assert access.quotas.used_bytes("Ann") == 0
+
+    @pytest.mark.parametrize("source", ["synthetic", "geometry"])
+    def test_btfs_that_are_rendered_count_with_their_values(
+        self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, source: str,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:  # fmt: skip
+        monkeypatch.setattr(client.app.state.services.btfs._service, "_claim_next", lambda: False)  # all wait
+        values = 81**2 * 8**2 * 3 * 2
+        settings.max_bytes_per_user = 2 * values - 1
+        ann, url = bearer("edit", "Ann"), f"/api/materials/btf/jobs/{source}"
+        body: dict[str, Any] = {"json": {"geometry": "weave", "size": 8}}
+        if source == "geometry":
+            body = {"files": {"geometry": ("a.obj", MESH)}, "data": {"size": 8}}
+        with ThreadPoolExecutor(2) as threads:
+            answers = [*threads.map(lambda _: client.post(url, headers=ann, **body), range(2))]
+        assert sorted(answer.status_code for answer in answers) == [202, 429]
+        assert access.quotas.used_bytes("Ann") == values + (len(MESH) if source == "geometry" else 0)
+        (made,) = [answer.headers["location"] for answer in answers if answer.status_code == 202]
+        assert client.delete(f"{made}?delete_files=true", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_compressed_btf_counts_with_its_stored_size(
@@ -238,7 +282,7 @@ class TestBakes:
     ) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         scene = client.post("/api/example-scenes/cornell_box", headers=ann).json()["id"]
-        recipes = [{"scene": scene, "size": list(SIZE), "lights": lights} for lights in (10, 20)]
+        recipes = [{"scene": scene, "method": "direct", "size": list(SIZE), "lights": lights} for lights in (10, 20)]
         first = client.post("/api/bakes", json=recipes[0], headers=ann)
         assert first.status_code == 202, first.text
         assert client.post("/api/bakes", json=recipes[0], headers=ann).status_code == 202  # the same recipe

@@ -119,7 +119,7 @@ def test_worker_bakes_queued_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("RELUME_DATABASE", f"sqlite:///{tmp_path / 'ledger.db'}")
     monkeypatch.setenv("RELUME_STORAGE", f"file://{tmp_path / 'shared'}")
     assert main(["import", "--built-in", "cornell_box"]) == 0
-    assert main(["bake", "Cornell box", "--size", "24x16", "--lights", "100", "--no-watch"]) == 0
+    assert main(["bake", "Cornell box", "--method", "direct", "--size", "24x16", "--lights", "100", "--no-watch"]) == 0
     worker = subprocess.Popen([*RELUME, "worker", "--processes", "1", "--data", str(tmp_path / "far")])
     try:
         with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'ledger.db'}"))) as ledger:

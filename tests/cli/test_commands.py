@@ -33,7 +33,7 @@ from relume_worker.scenes import register_scene
 from relume_worker.status import BakeStatus
 
 RELUME = [sys.executable, "-m", "relume_cli.main"]
-TINY = ["--size", "32x24", "--lights", "100"]
+TINY = ["--method", "direct", "--size", "32x24", "--lights", "100"]
 
 
 def open_ledger(data: Path) -> Ledger:
@@ -117,7 +117,7 @@ def test_built_in_scenes_are_imported_by_name(data: Path, capsys: pytest.Capture
         (["bake", "quad", "--lights", "0"], "at least 1"),
         (["bake", "quad", "--lights", "many"], "--lights is 'many'; give a whole number"),
         (["bake", "quad", "--lights=many"], "--lights is 'many'; give a whole number"),
-        (["bake", "quad", "--gather-rays", "100"], "direct"),
+        (["bake", "quad", "--method", "direct", "--gather-rays", "100"], "direct"),
         (["bake", "quad", "--method", "gather", "--gather-rays", "9"], "16 to 4,096"),
         (["bake", "quad", "--method", "probes", "--patches", "9"], "64 to"),
         (["bake", "quad", "--method", "magic"], "--method is 'magic'; give one of 'direct', 'gather', 'probes'"),
@@ -221,7 +221,7 @@ def test_render_writes_the_expected_radiance(data: Path, tmp_path: Path) -> None
 
 def test_render_takes_a_bake_by_its_id(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for size in ("32x24", "16x16"):
-        assert main(["bake", "quad", "--view", "front", "--size", size, "--lights", "10"]) == 0
+        assert main(["bake", "quad", "--view", "front", "--method", "direct", "--size", size, "--lights", "10"]) == 0
     fine, coarse = capsys.readouterr().out.split()
     for name, width in ((coarse, 16), (coarse[:12], 16), (fine, 32), ("quad", 32)):
         assert main(["render", name, "--output", str(tmp_path / "x.png")]) == 0
@@ -363,7 +363,16 @@ def hear_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-LONG = ["bake", "quad", "--size", "320x240", "--lights", "200"]  # long enough for a cluster to start
+LONG = [
+    "bake",
+    "quad",
+    "--method",
+    "direct",
+    "--size",
+    "320x240",
+    "--lights",
+    "200",
+]  # long enough for a cluster to start
 
 
 def wait_for_state(data: Path, state: str) -> None:

@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from btf_zips import zipped
 from PIL import Image
 from tiny_scenes import still_life
 
+from relume.assets.btf.import_btf import import_btf
 from relume.assets.environments.environment import Environment
 from relume.core.errors import NotFoundError
+from relume.images.image_store import store as store_image
 from relume.scene.model import Camera, Material, Mesh
 from relume.scene.scene_folder import make_scene
 from relume.store.bake_protocol import Recipe
@@ -25,10 +28,11 @@ from relume_cli.tokens import open_access
 from relume_server.persistence.look_store import LookStore
 from relume_server.schemas.bodies import BakeBody, DryRunBody, SceneBody
 from relume_worker.database.models import JobRow
+from relume_worker.paths import btfs_path, images_path
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
-TINY = ["--size", "32x24", "--lights", "100"]
+TINY = ["--method", "direct", "--size", "32x24", "--lights", "100"]
 RED = {"materials": {"White": {"terms": [{"model": "lambert", "color": [1.0, 0.0, 0.0]}]}}}
 BLUE = {"materials": {"White": {"terms": [{"model": "lambert", "color": [0.0, 0.0, 1.0]}]}}}
 
@@ -130,7 +134,7 @@ def test_repeated_bake_prints_one_line_of_json(run: Any) -> None:
 
 
 def test_queued_bake_is_canceled_deleted_and_audited(run: Any, baked: Path) -> None:
-    _, text, _ = run("bake", "quad one", "--size", "24x16", "--lights", "50", "--no-watch")
+    _, text, _ = run("bake", "quad one", "--method", "direct", "--size", "24x16", "--lights", "50", "--no-watch")
     bake = text.strip()
     assert f"{bake}  queued" in run("list", "bakes", "--state", "queued")[1]
     assert run("cancel", bake)[:2] == (0, f"{bake}\n")
@@ -144,6 +148,59 @@ def test_queued_bake_is_canceled_deleted_and_audited(run: Any, baked: Path) -> N
     assert "no scene" in run("status", bake)[2]
     noted = [(change.what, change.object) for change in open_access(baked).audit.list(2)]
     assert noted == [("delete bake", bake), ("cancel bake", bake)]
+
+
+JOBS = {
+    "render": (
+        "render",
+        "renders",
+        '{"bake":"0123456789abcdef","view":"Front","looks":[{}],"format":"png","frames":3}',
+    ),
+    "comparison": ("comparison", "comparisons", '{"bake":"0123456789abcdef","view":"Front","look":{},"passes":4}'),
+    "btf-job": ("btf", "btf-jobs", '{"name":"Felt","error":0.05}'),
+}
+LINES = {
+    "render": "1 of 3 frames  Front, png",
+    "comparison": "1 of 4 passes  Front of bake 0123456789abcdef",
+    "btf-job": "1 of 1 steps  Felt",
+}
+
+
+@pytest.mark.parametrize("noun", JOBS)
+def test_job_is_listed_canceled_and_deleted_by_its_id(run: Any, tmp_path: Path, noun: str) -> None:
+    kind, folder, request = JOBS[noun]
+    job = "0" * 15 + "a"
+    with closing(BakeService(tmp_path)) as service, service.ledger.sessions.begin() as session:
+        session.add(JobRow(id=job, kind=kind, request=request, state="queued", done=1, created=0.0))
+    access = open_access(tmp_path)
+    access.quotas.assign_owner("Ann", noun, job, 1_000)  # type: ignore[arg-type]
+    (tmp_path / folder / job).mkdir(parents=True)
+    assert run("list", f"{noun}s", "--state", "ready", data=tmp_path)[:2] == (0, "")
+    listed = run("list", f"{noun}s", data=tmp_path)[1]
+    assert listed == f"{job}  queued     {LINES[noun]}\n"
+    canceled = {"kind": noun, "id": job, "state": "canceled"}
+    assert parsed(run("cancel", listed.split()[0], "--json", data=tmp_path)[1]) == [canceled]
+    assert run("cancel", job, data=tmp_path) == (0, "", f"{noun} {job} is already canceled\n")
+    assert run("delete", noun, job[:8], "--yes", data=tmp_path)[:2] == (0, f"{job}\n")
+    assert run("list", f"{noun}s", data=tmp_path)[:2] == (0, "")
+    assert not (tmp_path / folder / job).exists()
+    assert access.quotas.used_bytes("Ann") == 0
+    assert [(change.what, change.object) for change in access.audit.list(2)] == [
+        (f"delete {noun}", job),
+        (f"cancel {noun}", job),
+    ]
+    assert f"there is no {noun}" in run("delete", noun, job, "--yes", data=tmp_path)[2]
+
+
+def test_image_and_material_are_deleted_by_their_listed_names(run: Any, tmp_path: Path) -> None:
+    Image.new("RGB", (4, 4)).save(tmp_path / "red.png")
+    store_image(images_path(tmp_path), tmp_path / "red.png", "Red")
+    import_btf(btfs_path(tmp_path), zipped(tmp_path / "b.zip"), "Felt", 0.05, lambda share: None, lambda: False)
+    for kind, name in (("image", "Red"), ("material", "Felt")):
+        listed = run("list", f"{kind}s", data=tmp_path)[1].split()
+        assert listed[1:] == [name]
+        assert run("delete", kind, listed[0], "--yes", data=tmp_path)[:2] == (0, f"{listed[0]}\n")
+        assert run("list", f"{kind}s", data=tmp_path)[:2] == (0, "")
 
 
 def test_followers_of_a_bake_learn_that_it_is_deleted(tmp_path: Path) -> None:

@@ -28,7 +28,9 @@ def look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     ledger = Ledger(open_database(f"sqlite:///{folder / 'relume.db'}"))
     register_scene(folder, ledger, still_life())
     ledger.close()
-    assert main(["bake", "still life", "--view", "front", "--size", "32x24", "--lights", "500"]) == 0
+    assert (
+        main(["bake", "still life", "--view", "front", "--method", "direct", "--size", "32x24", "--lights", "500"]) == 0
+    )
     capsys.readouterr()
     file = tmp_path / "look.json"
     white = '{"terms": [{"model": "lambert", "color": [0.9, 0.9, 0.9]}]}'

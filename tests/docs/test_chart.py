@@ -63,6 +63,17 @@ def test_client_addresses_pass_the_ingress() -> None:
     assert (CHART / "nginx.conf").read_text().count(marker) == 1
 
 
+def test_installation_warns_if_all_clients_share_the_address_of_the_ingress() -> None:
+    """`helm template` does not print the notes."""
+    (warning,) = re.findall(
+        r"{{- if and \.Values\.ingress\.enabled \(not \.Values\.proxy\.realIpFrom\) }}\n(.*?){{- end }}",
+        TEMPLATES["NOTES.txt"],
+        re.DOTALL,
+    )
+    assert "WARNING: all clients share the ingress's address" in warning
+    assert "proxy.realIpFrom" in warning
+
+
 @pytest.mark.parametrize("options", [SECRET, FULL])
 def test_chart_passes_helm_lint_and_renders(options: list[str]) -> None:
     helm = shutil.which("helm")

@@ -42,7 +42,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     server = Server(data)
     server.start()
     try:
-        server.bake({"scene": scene.id, "views": ["front", "left"], "size": SIZE, "lights": NUM_LIGHTS})
+        server.bake(
+            {"scene": scene.id, "method": "direct", "views": ["front", "left"], "size": SIZE, "lights": NUM_LIGHTS}
+        )
         yield server
     finally:
         server.kill()

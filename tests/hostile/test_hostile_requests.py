@@ -139,7 +139,9 @@ def test_impossible_render_is_refused(client: TestClient, baked: Baked, change: 
     ],
 )
 def test_impossible_bake_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
-    response = client.post("/api/bakes", json={"scene": baked.scene, "size": [8, 8], "lights": 9} | change)
+    response = client.post(
+        "/api/bakes", json={"scene": baked.scene, "method": "direct", "size": [8, 8], "lights": 9} | change
+    )
     assert parse_problem(response)["status"] in (404, 422)
 
 

@@ -2,6 +2,7 @@
 
 import io
 import time
+from functools import partial
 
 import numpy as np
 import OpenImageIO
@@ -13,6 +14,7 @@ from tiny_scenes import still_life
 
 from relume.brdf.texture_slots import IMAGES
 from relume.core.errors import SceneError
+from relume.core.folder_size import folder_bytes
 from relume.images.image_store import load_texture, records, store
 from relume.images.read_image import MAX_SIDE
 from relume.store.bake_protocol import Recipe
@@ -20,6 +22,7 @@ from relume_server.app import create_app
 from relume_server.client_state.look_state import LookState
 from relume_server.client_state.visible_views import VisibleViews
 from relume_server.settings import Settings
+from relume_worker.paths import images_path
 from relume_worker.scenes import register_scene
 
 URL = "/api/images"
@@ -163,6 +166,24 @@ def test_images_derived_from_a_metallic_map_are_deleted_with_it(client):
     assert client.delete("/api/looks/metal", headers={"If-Match": "*"}).status_code == 204
     assert client.delete(url).status_code == 204
     assert not {*textures, image["texture"]} & {entry["texture"] for entry in client.get(URL).json()}
+
+
+def test_images_derived_from_a_metallic_map_are_within_the_quota(client):
+    services = client.app.state.services
+    image = upload(client, png(64, 32), "metal.png").json()
+    terms = [{"model": "lambert", "texture": None}, {"model": "ggx", "texture": None}]
+    send = partial(
+        client.post, f"{URL}/{image['id']}/metalness", json={"scene": 16 * "0", "material": "Ball", "terms": terms}
+    )
+    before, num_before = services.access.quotas.used_bytes(""), len(client.get(URL).json())
+    services.settings.max_bytes_per_user = before + 2 * 3 * 64 * 32
+    refused = send()
+    assert (refused.status_code, len(client.get(URL).json())) == (429, num_before)
+    services.settings.max_bytes_per_user = None
+    textures = {term["texture"].removeprefix(IMAGES.prefix) for term in send().json()["terms"]}
+    stored = sum(folder_bytes(images_path(services.settings.data) / texture) for texture in textures)
+    assert services.access.quotas.used_bytes("") == before + stored
+    assert client.delete(f"{URL}/{image['id']}").status_code == 204
 
 
 def wait(is_done):

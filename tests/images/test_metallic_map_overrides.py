@@ -77,7 +77,8 @@ def shown(scene, terms):
 
 
 def override(library, scene, terms, image):
-    return with_metalness(library, terms, image.id, scene.id, "Tray", lambda _scene, _name: scene.materials[0])
+    read, reserve = lambda _scene, _name: scene.materials[0], lambda _num_bytes: None
+    return with_metalness(library, terms, image.id, scene.id, "Tray", read, reserve)
 
 
 @pytest.mark.parametrize("base", [BASE, None], ids=["map", "colour"])

@@ -63,7 +63,10 @@ def settings(tmp_path: Path, ack_seconds: float, empty_ledger: Path) -> Settings
 
 def open_fake_bakes(settings: Settings) -> BakeService:
     return BakeService(
-        settings.data, settings.database_url, methods={"direct": FakeMethod()}, client_weights=settings.fair_shares
+        settings.data,
+        settings.database_url,
+        methods={name: FakeMethod() for name in ("direct", "gather")},
+        client_weights=settings.fair_shares,
     )
 
 

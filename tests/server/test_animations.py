@@ -86,7 +86,9 @@ def test_turntable_rotates_the_object_or_the_environment(
         of_frame["camera"][1:]
     )  # a ball looks the same from all sides, except for facets
     assert min(of_frame["environment"][1:]) > 3 * max(of_frame["object"])
-    fixed = client.post("/api/bakes", json={"scene": scene["id"], "size": SIZE, "lights": 50}).headers["location"]
+    fixed = client.post(
+        "/api/bakes", json={"scene": scene["id"], "method": "direct", "size": SIZE, "lights": 50}
+    ).headers["location"]
     of_fixed = {"bake": wait_until_done(client, fixed)["id"], "view": scene["views"][0]["name"]}
     turned = frames_of(client, of_fixed | {"path": {"turntable": 3, "rotate": "environment"}}, tmp_path)
     look = {"environment": {"rotation": 120}}
@@ -161,7 +163,7 @@ def test_invalid_paths_are_rejected_with_a_reason(
 def test_fixed_view_follows_looks_and_rejects_paths(
     client: TestClient, scene: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
-    request = {"scene": scene["id"], "size": SIZE, "lights": 50}
+    request = {"scene": scene["id"], "method": "direct", "size": SIZE, "lights": 50}
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     name = scene["views"][0]["name"]
     refused = client.post(

@@ -41,7 +41,7 @@ def test_camera_is_saved_listed_baked_and_deleted(real_client: TestClient, scene
     assert [view["name"] for view in views if view["is_placed"]] == ["Close up"]
     assert real_client.get("/api/scenes").json()[0]["views"] == views
 
-    request = {"scene": scene, "size": [32, 24], "lights": 50}
+    request = {"scene": scene, "method": "direct", "size": [32, 24], "lights": 50}
     by_name = real_client.post("/api/bakes", json=request | {"views": ["Close up"]})
     as_it_is = real_client.post("/api/bakes", json=request | {"views": [{"name": "Close up", **frame}]})
     assert by_name.status_code == 202, by_name.text
@@ -61,7 +61,9 @@ def test_view_of_a_saved_camera_is_compared_with_its_reference(real_client: Test
     (front, *_) = real_client.get(f"/api/scenes/{scene}/cameras").json()
     moved = [*front["to_world"][:3], front["to_world"][3] + 0.3, *front["to_world"][4:]]
     placed = {"name": "Aside", "to_world": moved, "yfov": front["yfov"]}
-    queued = real_client.post("/api/bakes", json={"scene": scene, "size": [32, 24], "lights": 50, "views": [placed]})
+    queued = real_client.post(
+        "/api/bakes", json={"scene": scene, "method": "direct", "size": [32, 24], "lights": 50, "views": [placed]}
+    )
     bake = ready(real_client, queued.headers["location"])
     asked = real_client.post("/api/comparisons", json={"bake": bake, "view": "Aside", "look": {}, "passes": 4})
     assert asked.status_code in (200, 202), asked.text

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import io
+from collections.abc import Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from coroutines import run_in_thread
 from fastapi.testclient import TestClient
 from PIL import Image
 from problems import parse_problem
 from server_fakes import SIZE
 from session_client import ROOM_FIELDS, Baked, open_session
 
+from relume.core.errors import DiskFullError
 from relume_server.collaboration.comment_sync import CommentSync
 from relume_server.persistence import comment_store
 
@@ -149,3 +155,27 @@ def test_rooms_are_notified_of_comments_on_another_server(
         look()
         look()
         assert notified == [baked.scene] * 4
+
+
+def test_outage_is_resolved_by_a_query_and_not_by_the_end_of_all_rooms(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 0.0)
+    polls = [{"lost"}, set(), set(), {"scene"}]
+    num_messages: list[int] = []
+
+    def scenes() -> set[str]:
+        num_messages.append(len(caplog.records))
+        if not polls:
+            raise asyncio.CancelledError
+        return polls.pop(0)
+
+    def marks(names: Collection[str]) -> Mapping[str, object]:
+        if "lost" in names:
+            raise DiskFullError("the database")
+        return dict.fromkeys(names, 1)
+
+    with ThreadPoolExecutor(1) as threads, pytest.raises(asyncio.CancelledError):
+        run_in_thread(CommentSync(SimpleNamespace(scenes=scenes), marks, threads).run())  # type: ignore[arg-type]
+    assert num_messages == [0, 1, 1, 1, 2]
+    assert caplog.records[-1].getMessage() == "new comments cannot be read: resolved"

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -118,6 +121,49 @@ class TestTime:
         monkeypatch.setattr(library, "list", lambda *_: (late.wait(60), [])[1])
         request = HEAD.replace(b"/livez", b"/api/looks") + b"\r\n"
         assert answer_to(running, request + b"G", ends=False).startswith(b"HTTP/1.1 200")
+
+
+class TestUnreadResponses:
+    NUM = 200
+
+    @pytest.fixture(autouse=True)
+    def _impatient(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(connection, "WRITE_SECONDS", 0.3)
+
+    def requests(self) -> bytes:
+        return (HEAD.replace(b"/livez", b"/api/openapi.json") + b"\r\n") * self.NUM
+
+    def test_connection_whose_client_does_not_read_ends(
+        self, running: Running, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        has_ended, lost = threading.Event(), connection.Connection.connection_lost
+
+        def note(self: connection.Connection, exc: Exception | None) -> None:
+            lost(self, exc)
+            has_ended.set()
+
+        monkeypatch.setattr(connection.Connection, "connection_lost", note)
+        with socket.create_connection(("127.0.0.1", running.port), timeout=60) as asking:
+            asking.sendall(self.requests())
+            assert has_ended.wait(60)
+
+    def test_slow_reader_gets_all_responses(self, running: Running) -> None:
+        with socket.create_connection(("127.0.0.1", running.port), timeout=60) as asking:
+            asking.sendall(self.requests()[:-2] + b"Connection: close\r\n\r\n")
+            num_responses, end = 0, b""
+            while chunk := asking.recv(1 << 18):
+                num_responses += (end + chunk).count(b"HTTP/1.1 200 OK")
+                end = chunk[-14:]
+                time.sleep(0.001)
+        assert num_responses == self.NUM
+
+    @pytest.mark.parametrize(("num_sent", "is_aborted"), [(0, True), (100, True), (1 << 16, False)])
+    def test_large_response_may_take_many_periods(self, num_sent: int, is_aborted: bool) -> None:
+        aborted, limited = [], []
+        transport = SimpleNamespace(get_write_buffer_size=lambda: (1 << 20) - num_sent, abort=lambda: aborted.append(1))
+        writing: Any = SimpleNamespace(transport=transport, _limit_write=lambda: limited.append(1))
+        connection.Connection._check_write(writing, 1 << 20)
+        assert (bool(aborted), bool(limited)) == (is_aborted, not is_aborted)
 
 
 def test_excess_connection_is_rejected_with_a_reason(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:

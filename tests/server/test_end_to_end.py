@@ -74,7 +74,7 @@ def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
 def test_streamed_picture_equals_the_render(real_client: TestClient, tmp_path: Path) -> None:
     glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
     scene = real_client.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
-    request: dict[str, Any] = {"scene": scene["id"], "size": [WIDTH, HEIGHT], "lights": 200}
+    request: dict[str, Any] = {"scene": scene["id"], "method": "direct", "size": [WIDTH, HEIGHT], "lights": 200}
     bake = wait_until_done(real_client, real_client.post("/api/bakes", json=request).headers["location"])
     assert bake["state"] == "ready", bake["problem"]
 
@@ -110,7 +110,7 @@ def test_frame_matches_the_reference(real_client: TestClient) -> None:
     """The comparison over REST with the real reference measures the error of the bake, not its own noise."""
     glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
     scene = real_client.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
-    bake_request: dict[str, Any] = {"scene": scene["id"], "size": [32, 24], "lights": 1000}
+    bake_request: dict[str, Any] = {"scene": scene["id"], "method": "direct", "size": [32, 24], "lights": 1000}
     bake = wait_until_done(real_client, real_client.post("/api/bakes", json=bake_request).headers["location"])
     request = {"bake": bake["id"], "view": scene["views"][0]["name"], "passes": 8}
     comparison = wait_until_done(real_client, real_client.post("/api/comparisons", json=request).headers["location"])

@@ -157,7 +157,7 @@ def test_static_view_follows_when_the_camera_stops_and_edits_continue_in_it(
         session.edit(number - 4, f"/materials/{material}/terms", terms)
         edited = exact_of(session, number, number - 4)
         camera = {"name": "placed", "to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])}
-        request = {"scene": scene["id"], "views": [camera], "size": SIZE, "lights": 100}
+        request = {"scene": scene["id"], "method": "direct", "views": [camera], "size": SIZE, "lights": 100}
         fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
         look = {"materials": {material: {"terms": terms}}}
         rendered = rendered_by(client, {"bake": fixed["id"], "view": "placed", "looks": [look]}, tmp_path)
@@ -246,7 +246,7 @@ def test_cameras_inside_a_solid_or_far_away_are_accepted(session: Session) -> No
 def test_fixed_views_reject_cameras_and_free_cameras_have_no_mask(
     client: TestClient, scene: dict[str, Any], bake: str
 ) -> None:
-    request = {"scene": scene["id"], "size": SIZE, "lights": 50}
+    request = {"scene": scene["id"], "method": "direct", "size": SIZE, "lights": 50}
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     with open_session(client, fixed["id"]) as session:
         (view,) = hello(session)["views"]
@@ -363,7 +363,7 @@ def test_unknown_arrays_and_arrays_of_fixed_views_are_not_found(
 ) -> None:
     missing = client.get(f"/api/bakes/{bake}/probes/lights")
     assert (missing.status_code, "choose from corners" in missing.json()["detail"]) == (404, True)
-    request = {"scene": scene["id"], "size": SIZE, "lights": 100}
+    request = {"scene": scene["id"], "method": "direct", "size": SIZE, "lights": 100}
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     for path in ("probes", "probes/corners"):
         refused = client.get(f"/api/bakes/{fixed['id']}/{path}")

@@ -339,8 +339,8 @@ def test_slow_link_gets_jpeg_during_drags_and_one_hdr_frame_after(
 def test_finer_bake_is_announced(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        finer = {"scene": baked.scene, "size": [WIDTH, HEIGHT], "lights": 50}
-        coarser = {"scene": baked.scene, "size": [16, 16], "lights": 5}
+        finer = {"scene": baked.scene, "method": "direct", "size": [WIDTH, HEIGHT], "lights": 50}
+        coarser = {"scene": baked.scene, "method": "direct", "size": [16, 16], "lights": 5}
         client.post("/api/bakes", json=coarser)
         bake = client.post("/api/bakes", json=finer).json()["id"]
         while (news := session.text("bake"))["state"] != "ready":

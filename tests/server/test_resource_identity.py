@@ -24,7 +24,7 @@ def test_scene_identity_is_file_and_name(client: TestClient) -> None:
 
 
 def test_equal_recipes_are_the_same_bake(client: TestClient, baked: Baked) -> None:
-    recipe = {"scene": baked.scene, "views": ["front"], "size": [160, 96], "lights": 10}
+    recipe = {"scene": baked.scene, "method": "direct", "views": ["front"], "size": [160, 96], "lights": 10}
     first, again = (client.post("/api/bakes", json=recipe).json()["id"] for _ in range(2))
     assert first == again
     assert client.post("/api/bakes", json={**recipe, "lights": 11}).json()["id"] != first

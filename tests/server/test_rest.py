@@ -104,7 +104,7 @@ def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: byt
     plan = client.post("/api/bakes", json=request | {"dry_run": True})
     assert plan.status_code == 200
     assert plan.json()["recipe"] == {
-        "method": "direct", "views": ["front"], "size": [320, 240], "lights": 300, "probes": None,
+        "method": "gather", "views": ["front"], "size": [320, 240], "lights": 300, "probes": None,
         "patches": None, "gather_rays": None, "relightable": False, "cameras": [],
     }  # fmt: skip
     assert client.get("/api/bakes").json() == []
@@ -125,7 +125,7 @@ def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: byt
 
 def test_thumbnail_uses_the_coarsest_sufficient_bake(client: TestClient, baked: Baked) -> None:
     for size, is_shown in (([640, 480], True), ([400, 300], True), ([64, 48], False), ([500, 400], False)):
-        queued = client.post("/api/bakes", json={"scene": baked.scene, "size": size, "lights": 100})
+        queued = client.post("/api/bakes", json={"scene": baked.scene, "method": "direct", "size": size, "lights": 100})
         assert wait_until_done(client, queued.headers["location"])["state"] == "ready"
         shown = client.get(f"/api/scenes/{baked.scene}").json()
         assert shown["thumbnail"].endswith(f"bake={queued.json()['id']}") == is_shown
@@ -149,7 +149,7 @@ def test_views_have_the_aspect_of_their_camera_and_presets_accept_any(client: Te
 
 
 def test_repeated_recipe_is_the_same_bake(client: TestClient, baked: Baked) -> None:
-    request = {"scene": baked.scene, "size": [64, 48], "lights": 20}
+    request = {"scene": baked.scene, "method": "direct", "size": [64, 48], "lights": 20}
     first, second = (client.post("/api/bakes", json=request).json() for _ in range(2))
     assert first["id"] == second["id"]
 
@@ -183,7 +183,7 @@ def test_nearly_full_disk_rejects_new_work_and_allows_deletion(
     client: TestClient, settings: Settings, baked: Baked
 ) -> None:
     settings.min_free_bytes = 1 << 60
-    bake = {"scene": baked.scene, "size": [24, 16], "lights": 11}
+    bake = {"scene": baked.scene, "method": "direct", "size": [24, 16], "lights": 11}
     image = {"files": {"image": ("a.png", b"")}}
     for refused in (
         client.post("/api/example-scenes/cornell_box"),

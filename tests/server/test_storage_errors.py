@@ -3,16 +3,20 @@
 import errno
 import logging
 import os
+import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import pytest
 from fastapi.testclient import TestClient
 from postgres import make_unavailable_error
 from server_fakes import write_tiny_scene
+from session_client import Baked
 
 from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
+from relume.store.disk_space import RESERVE_BYTES
 from relume_server.batch.cluster_steps import _answer
-from relume_server.errors import make_problem
+from relume_server.errors import NearlyFullError, make_problem
 from relume_server.io import import_request
 from relume_server.io.import_request import ImportRequest, run_import
 from relume_server.settings import Settings
@@ -45,9 +49,29 @@ def test_damaged_database_is_one_sentence_and_one_log_line(
     assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
 
 
+def test_readiness_is_checked_once_a_second_for_all_callers(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    num_checks = 0
+
+    def check_room() -> None:
+        nonlocal num_checks
+        num_checks += 1
+        raise NearlyFullError("full")
+
+    monkeypatch.setattr("relume_server.runtime.recent_check.MAX_AGE_S", 1e9)
+    monkeypatch.setattr(client.app.state.services.access.quotas, "check_room", check_room)  # type: ignore[attr-defined]
+    with ThreadPoolExecutor(5) as threads:
+        assert [*threads.map(lambda _: client.get("/readyz").status_code, range(50))] == [507] * 50
+    assert num_checks == 1
+    monkeypatch.setattr("relume_server.runtime.recent_check.MAX_AGE_S", 0.0)
+    assert (client.get("/readyz").status_code, num_checks) == (507, 2)
+
+
 def test_nearly_full_disk_is_not_ready_and_logged_once(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
+    monkeypatch.setattr("relume_server.runtime.recent_check.MAX_AGE_S", 0.0)
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
     answer = client.get("/readyz")
     assert (answer.status_code, answer.json()["title"]) == (507, "Disk is nearly full")
@@ -60,6 +84,44 @@ def test_nearly_full_disk_is_not_ready_and_logged_once(
     assert len(said) == 2
     assert "12 MB left" in said[0]
     assert "enough space again" in said[1]
+
+
+def test_render_that_may_fill_the_disk_is_rejected(
+    client: TestClient, baked: Baked, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr", "size": [16, 16]}
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, settings.min_free_bytes + 1_000_000))
+    refused = client.post("/api/renders", json={**request, "frames": 100})
+    assert (refused.status_code, refused.json()["title"]) == (507, "Disk is nearly full")
+    assert "269 MB left, too little for up to 13 MB more" in refused.json()["detail"]
+    assert client.post("/api/renders", json=request).status_code == 202
+    assert client.get("/readyz").status_code == 200
+
+
+def test_archive_of_a_batch_needs_the_space_of_its_frames(
+    client: TestClient, baked: Baked, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings.min_free_bytes = 0
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, RESERVE_BYTES))
+    request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "png"}
+    url = client.post("/api/renders", json=request).headers["location"]
+    while (body := client.get(url).json())["state"] not in ("ready", "failed"):
+        time.sleep(0.01)
+    assert (body["state"], "the files of a render cannot be written" in body["problem"]) == ("failed", True)
+    assert client.get(f"{url}/frames/0").status_code == 200
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, 1 << 40))
+    assert client.post(f"{url}/resume").status_code == 202
+    while (body := client.get(url).json())["state"] != "ready":
+        assert body["state"] != "failed", body
+        time.sleep(0.01)
+    assert client.get(f"{url}/archive.zip").status_code == 200
+
+
+@pytest.mark.parametrize("path", ["renders", "comparisons", "materials/btf/jobs"])
+def test_no_job_resumes_on_a_nearly_full_disk(client: TestClient, path: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert client.post(f"/api/{path}/{'0' * 16}/resume").status_code == 404
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
+    assert client.post(f"/api/{path}/{'0' * 16}/resume").status_code == 507
 
 
 @pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])

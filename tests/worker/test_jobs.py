@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from pydantic import BaseModel
 from sqlalchemy import select, update
 
 from relume.core.errors import CancelledError, DiskFullError, RelumeError
+from relume.store.disk_space import RESERVE_BYTES
 from relume_worker.database import open_database
 from relume_worker.database.models import JobRow
 from relume_worker.jobs.fair_share import FairShare, Waiting
@@ -244,6 +246,38 @@ def test_job_that_waits_for_disk_space_says_so(tmp_path: Path, ledger: Ledger) -
     assert jobs.frames.get(identity).problem is None
 
 
+def test_leases_that_cannot_be_renewed_are_logged_once_until_they_are(
+    tmp_path: Path, ledger: Ledger, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A full disk can be read: polling the queue succeeds meanwhile."""
+    monkeypatch.setattr("relume_worker.jobs.job_service.RENEW_S", 0.001)
+    monkeypatch.setattr("relume_worker.jobs.job_service.POLL_INTERVAL_S", 0.001)
+    service, num_renewals, num_polls, is_full = Jobs(ledger, tmp_path, Machine()).service, 0, 0, True
+
+    def claimable(*_: object) -> list[Waiting]:
+        nonlocal num_polls
+        num_polls += 1
+        return []
+
+    def renew_leases() -> None:
+        nonlocal num_renewals
+        num_renewals += 1
+        if is_full:
+            raise DiskFullError("the database")
+
+    monkeypatch.setattr(service.ledger, "claimable", claimable)
+    monkeypatch.setattr(service.ledger, "renew_leases", renew_leases)
+    service._runs["a"] = Waiting("a", "ann", False, 1.0), threading.Thread()
+    service.start()
+    wait_for(lambda: min(num_renewals, num_polls) >= 5)
+    messages = [record.getMessage().split(" (")[0] for record in caplog.records]
+    is_full, num_renewals = False, 0
+    wait_for(lambda: num_renewals >= 3)
+    service.close()
+    assert messages == ["the leases of jobs cannot be renewed"]
+    assert [record.getMessage() for record in caplog.records[1:]] == ["the leases of jobs cannot be renewed: resolved"]
+
+
 def test_frames_of_one_job_take_all_slots(tmp_path: Path, ledger: Ledger) -> None:
     machine = Machine(3)
     jobs = Jobs(ledger, tmp_path, machine, num_slots=3)
@@ -290,6 +324,30 @@ def test_failed_step_fails_the_job_and_the_rest_resumes(tmp_path: Path, ledger: 
     jobs.service.close()
     assert before < 6
     assert len(machine.done) == 6, "finished frames are not rendered again"
+
+
+def test_job_whose_disk_fills_up_fails_and_resumes(
+    tmp_path: Path, ledger: Ledger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = Machine()
+    jobs = Jobs(ledger, tmp_path, machine)
+
+    def free(path: Path) -> SimpleNamespace:
+        return SimpleNamespace(free=RESERVE_BYTES - (len(machine.done) == 2))
+
+    monkeypatch.setattr("shutil.disk_usage", free)
+    jobs.service.start()
+    identity = jobs.submit("a", num=4)
+    jobs.wait(identity, "failed")
+    assert jobs.frames.get(identity).problem == (
+        "the files of a render cannot be written, the disk is full; free some space, then try again"
+    )
+    assert sorted(path.name for path in (tmp_path / identity).glob("[0-9]")) == ["0", "1"]
+    machine.done.append("deleted files")
+    jobs.frames.resume(identity)
+    jobs.wait(identity)
+    jobs.service.close()
+    assert machine.done == ["a", "a", "deleted files", "a", "a"]
 
 
 @pytest.mark.parametrize("end", ["stop", "delete", "close"])

@@ -129,7 +129,7 @@ class Users:
 
     def _baked(self, scene: str, lights: int, size: int = 96) -> str:
         call = self._server.call
-        bake = call("/api/bakes", {"scene": scene, "size": [size, size], "lights": lights})
+        bake = call("/api/bakes", {"scene": scene, "method": "direct", "size": [size, size], "lights": lights})
         while bake["state"] not in DONE and not self._stop.is_set():
             time.sleep(0.2)
             bake = call(f"/api/bakes/{bake['id']}")

@@ -1,4 +1,4 @@
-"""`relume delete`: delete scenes, bakes, looks and environments."""
+"""`relume delete`: delete scenes, bakes, looks, assets and jobs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume_cli.terminal.printing import Json, print_result
 if TYPE_CHECKING:
     from relume_cli.database.actions import OpenFolder
 
-Kind = Literal["scene", "bake", "look", "environment"]
+Kind = Literal["scene", "bake", "look", "environment", "material", "image", "render", "comparison", "btf-job"]
 
 
 class Deletable(NamedTuple):
@@ -32,10 +32,10 @@ def delete(
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Delete scenes, bakes, looks or environments.
+    """Delete scenes, bakes, looks, assets or jobs.
 
-    A server need not stop: sessions that show a deleted bake end with a message. Looks that use a deleted environment
-    are no longer valid.
+    A server need not stop: sessions that show a deleted bake end with a message. Looks that use a deleted environment,
+    material or image are no longer valid. An image is deleted with those that are derived from it.
     """
     from relume_cli.database.actions import open_data_folder
     from relume_cli.tokens import audit_change
@@ -125,9 +125,66 @@ def _environment(data_folder: OpenFolder, name: str) -> Deletable:
     return Deletable(environment_id, f"environment {environment_id} ({dict(candidates)[environment_id]})", remove)
 
 
+def _material(data_folder: OpenFolder, name: str) -> Deletable:
+    from relume.assets.btf import btf_store
+    from relume.assets.measured import measured_store
+    from relume_cli.name_lookup import pick
+    from relume_worker.paths import btfs_path, materials_path
+
+    measured, btfs = materials_path(data_folder.settings.data), btfs_path(data_folder.settings.data)
+    names = {record.data: record.name for record in (*measured_store.records(measured), *btf_store.records(btfs))}
+    material = pick("measured material or BTF", name, list(names.items()), "fits of the library cannot be deleted")
+    store, folder, owned = measured_store.STORE, measured, "material"
+    if material.startswith(btf_store.STORE.prefix):
+        store, folder, owned = btf_store.STORE, btfs, "btf"
+    identity = material.removeprefix(store.prefix)
+
+    def remove() -> None:
+        store.remove(folder, identity)
+        data_folder.access.quotas.disown(owned, identity)
+
+    return Deletable(material, f"material {material} ({names[material]})", remove)
+
+
+def _image(data_folder: OpenFolder, name: str) -> Deletable:
+    from relume.brdf.texture_slots import IMAGES
+    from relume.images.image_store import records
+    from relume_cli.name_lookup import pick
+    from relume_worker.paths import images_path
+
+    folder = images_path(data_folder.settings.data)
+    images = records(folder)
+    names = {record.texture: record.name for record in images}
+    texture = pick("image", name, list(names.items()), "upload images in the editor")
+    derived = [record.texture for record in images if record.recipe and texture in record.recipe.images]
+
+    def remove() -> None:
+        for each in (*derived, texture):
+            identity = each.removeprefix(IMAGES.prefix)
+            IMAGES.remove(folder, identity)
+            data_folder.access.quotas.disown("image", identity)
+
+    return Deletable(texture, f"image {texture} ({names[texture]})", remove)
+
+
+def _job(noun: str) -> Callable[[OpenFolder, str], Deletable]:
+    def find(data_folder: OpenFolder, name: str) -> Deletable:
+        from relume_cli.database.jobs import delete_job, find_job
+
+        identity = find_job(data_folder, noun, name).id
+        return Deletable(identity, f"{noun} {identity}", lambda: delete_job(data_folder, noun, identity))
+
+    return find
+
+
 FINDERS: dict[Kind, Callable[[OpenFolder, str], Deletable]] = {
     "scene": _scene,
     "bake": _bake,
     "look": _look,
     "environment": _environment,
+    "material": _material,
+    "image": _image,
+    "render": _job("render"),
+    "comparison": _job("comparison"),
+    "btf-job": _job("btf-job"),
 }

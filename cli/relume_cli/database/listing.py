@@ -1,12 +1,14 @@
-"""`relume list`: list scenes, bakes, looks and assets."""
+"""`relume list`: list scenes, bakes, looks, assets and jobs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from relume_cli.database.jobs import list_jobs
 from relume_cli.options import Data
 from relume_cli.terminal.printing import Json, iso_time, print_result
 
@@ -15,7 +17,10 @@ if TYPE_CHECKING:
     from relume.assets.measured.measured_store import MaterialRecord
     from relume_cli.database.actions import OpenFolder
 
-Kind = Literal["scenes", "bakes", "looks", "environments", "materials", "images", "renders", "built-ins"]
+Kind = Literal[
+    "scenes", "bakes", "looks", "environments", "materials", "images", "renders", "comparisons", "btf-jobs", "built-ins"
+]
+JOB_KINDS = ("renders", "comparisons", "btf-jobs")
 Row = tuple[dict[str, Any], str]
 """An entry as JSON, and as a line that begins with its name or id."""
 
@@ -24,12 +29,12 @@ def list_items(
     kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to list.", show_default=True)] = "scenes",
     scene: Annotated[str | None, typer.Option("--scene", metavar="SCENE", help="Only bakes of this scene.")] = None,
     state: Annotated[
-        str | None, typer.Option("--state", metavar="STATE", help="Only bakes or renders in this state.")
+        str | None, typer.Option("--state", metavar="STATE", help="Only bakes or jobs in this state.")
     ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """List scenes, bakes, looks, and assets.
+    """List scenes, bakes, looks, assets and jobs.
 
     Newest first. Each line begins with the id or name that other commands accept.
     """
@@ -38,7 +43,7 @@ def list_items(
 
     if scene is not None and kind != "bakes":
         raise ParameterError("--scene", scene, f"no scene, because {kind} have none")
-    if state is not None and kind not in ("bakes", "renders"):
+    if state is not None and kind not in ("bakes", *JOB_KINDS):
         raise ParameterError("--state", state, f"no state, because {kind} have none")
     if kind == "built-ins":
         rows = _built_ins()
@@ -134,34 +139,6 @@ def _images(data_folder: OpenFolder) -> Iterator[Row]:
         yield document, f"{record.texture:22}  {record.name}"
 
 
-def _renders(data_folder: OpenFolder) -> Iterator[Row]:
-    """Renders as in the database; only the server knows the progress within a frame."""
-    from sqlalchemy import select
-
-    from relume_server.schemas.renders import RENDER_PLACEHOLDER
-    from relume_worker.database.models import JobRow
-    from relume_worker.jobs.job import read_row
-
-    with data_folder.service.ledger.sessions() as session:
-        rows = list(session.scalars(select(JobRow).where(JobRow.kind == "render").order_by(JobRow.created.desc())))
-    for row in rows:
-        request, state, problem = read_row(row, RENDER_PLACEHOLDER)
-        document = {
-            "id": row.id,
-            "bake": request.bake,
-            "view": request.view,
-            "format": request.format,
-            "size": request.size,
-            "state": state,
-            "done": row.done,
-            "total": request.num_frames,
-            "problem": problem,
-            "created": iso_time(row.created),
-        }
-        done = f"{row.done} of {request.num_frames} frames"
-        yield document, f"{row.id}  {state:9}  {done}  {request.name or request.view}, {request.format}"
-
-
 def _built_ins() -> list[Row]:
     from relume.scene.examples.catalog import BUILT_IN
 
@@ -174,5 +151,7 @@ LISTS: dict[str, Callable[[OpenFolder], Iterator[Row]]] = {
     "environments": _environments,
     "materials": _materials,
     "images": _images,
-    "renders": _renders,
+    "renders": partial(list_jobs, noun="render"),
+    "comparisons": partial(list_jobs, noun="comparison"),
+    "btf-jobs": partial(list_jobs, noun="btf-job"),
 }

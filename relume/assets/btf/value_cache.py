@@ -24,6 +24,11 @@ MAX_VALUE = 60_000.0
 """Near the limit of half precision; brighter values are mirror reflections of the light."""
 
 
+def value_bytes(grid: DirectionGrid, size: tuple[int, int]) -> int:
+    """Size of all values. grid: grid of the directions. size: height and width in texels."""
+    return grid.num_directions**2 * size[0] * size[1] * 3 * np.dtype(np.float16).itemsize
+
+
 class ValueFile:
     """Values that are filled view by view, then read; implements `relume.assets.btf.compressed_view.ViewArrays`.
 

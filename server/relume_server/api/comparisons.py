@@ -13,16 +13,16 @@ from relume_server.api.bakes import require_ready_bake
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import PageDep
 from relume_server.api.renders import baked_view, check_display, check_look, check_picture_size
-from relume_server.auth.roles import CallerDep
+from relume_server.auth.roles import Caller, CallerDep
 from relume_server.batch.frame_sequence import comparison_camera
 from relume_server.io.downloads import Download
-from relume_server.jobs.comparison_jobs import ComparisonJob
+from relume_server.jobs.comparison_jobs import ComparisonJob, planned_bytes
 from relume_server.openapi import files
 from relume_server.schemas.base import Id
 from relume_server.schemas.bodies import ComparisonBody, ComparisonPlanBody, ComparisonRequest
 from relume_server.services import Services, ServicesDep
 from relume_worker.job_state import JobState
-from relume_worker.jobs.job import JobFilter, NotReadyError
+from relume_worker.jobs.job import JobFilter, NotReadyError, new_id
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 Picture = Literal["error", "reference", "method-error", "method-reference"]
@@ -38,15 +38,21 @@ async def submit_comparison(
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         await run_in_threadpool(_check, request, transfer)
+        _, size = comparison_camera(request, transfer)
         if request.dry_run:
             response.status_code = 200
-            _, (width, height) = comparison_camera(request, transfer)
-            foreseen = await run_in_threadpool(services.comparisons.estimate_duration, request, width * height)
+            foreseen = await run_in_threadpool(services.comparisons.estimate_duration, request, size[0] * size[1])
             return ComparisonPlanBody(passes=request.passes, **foreseen._asdict())
-    await run_in_threadpool(services.access.quotas.check_room)
-    identity = await run_in_threadpool(services.comparisons.submit, request, caller.name)
+    identity = await run_in_threadpool(_queue, request, planned_bytes(request, size), caller, services)
     response.headers["Location"] = f"/api/comparisons/{identity}"
     return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))
+
+
+def _queue(request: ComparisonRequest, max_bytes: int, caller: Caller, services: Services) -> str:
+    """Queue a comparison that takes at most so many bytes. Raises QuotaError, NearlyFullError, BusyError."""
+    identity = new_id()
+    with services.access.quotas.planned(caller.name, "comparison", identity, max_bytes):
+        return services.comparisons.submit(request, caller.name, identity=identity)
 
 
 def _check(request: ComparisonRequest, transfer: OpenBake) -> None:
@@ -84,12 +90,15 @@ def get_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
 def stop_comparison(comparison: Id, services: ServicesDep, delete_files: bool = False) -> Response:
     """Stop a comparison; its results are saved, unless `delete_files` is true."""
     (services.comparisons.delete if delete_files else services.comparisons.stop)(comparison)
+    if delete_files:
+        services.access.quotas.disown("comparison", comparison)
     return Response(status_code=204)
 
 
 @router.post("/{comparison}/resume", status_code=202)
 def resume_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
     """Resume a stopped or failed comparison after its last finished pass."""
+    services.access.quotas.check_room()
     services.comparisons.resume(comparison)
     return _body(services.comparisons.get(comparison), services)
 

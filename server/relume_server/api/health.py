@@ -5,10 +5,8 @@ from __future__ import annotations
 from fastapi import APIRouter
 from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
-from sqlalchemy import select
 
 from relume_server.services import ServicesDep
-from relume_worker.database.models import JobRow
 
 router = APIRouter(tags=["health"])
 
@@ -20,12 +18,10 @@ async def livez() -> dict[str, str]:
 
 
 @router.get("/readyz")
-def readyz(services: ServicesDep) -> dict[str, str]:
+async def readyz(services: ServicesDep) -> dict[str, str]:
     """The database is readable, the data directory has space, and the server is not draining."""
     services.drain.check()
-    with services.bakes.ledger.sessions() as session:
-        session.execute(select(JobRow.id).limit(1))
-    services.access.quotas.check_room()
+    await services.readiness.check()
     return {"status": "ready"}
 
 

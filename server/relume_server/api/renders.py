@@ -70,13 +70,10 @@ async def submit_render(
 
 
 def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Services) -> str:
-    """Queue a batch that counts at most so many bytes for the caller. Raises QuotaError, BusyError."""
-    quotas = services.access.quotas
-    with quotas.deciding:
-        quotas.check_bytes(caller.name, max_bytes)
-        identity = new_id()
-        with quotas.owner_assigned(caller.name, "render", identity, max_bytes):
-            return services.renders.submit(request, caller.name, identity=identity)
+    """Queue a batch that takes at most so many bytes. Raises QuotaError, NearlyFullError, BusyError."""
+    identity = new_id()
+    with services.access.quotas.planned(caller.name, "render", identity, max_bytes):
+        return services.renders.submit(request, caller.name, identity=identity)
 
 
 @router.post("/looks")

@@ -41,7 +41,7 @@ _UNCHANGED = 200
 
 
 class AuthMiddleware:
-    """Middleware between `RequestLimits`, which knows no callers, and the routes.
+    """Middleware between `RequestLimits`, which refuses before callers are known, and the routes.
 
     Args:
         app: application of the routes. settings: settings of the server.

@@ -1,4 +1,4 @@
-"""Quotas per user: bytes of uploads, bakes and renders, queued and running bakes, live sessions."""
+"""Quotas per user: bytes of uploads, bakes, renders and comparisons, queued and running bakes, live sessions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 OwnedKind = Literal[
-    "upload", "scene", "environment", "material", "btf-job", "btf", "image", "imported", "bake", "render"
+    "upload", "scene", "environment", "material", "btf-job", "btf", "image", "imported", "bake", "render", "comparison"
 ]
 MAX_STREAMS_EACH = 32
 """Maximum number of event streams per caller."""
@@ -92,8 +92,10 @@ class Quotas:
         """True if bytes are limited."""
         return self.settings.max_bytes_per_user is not None
 
-    def check_room(self) -> None:
-        """Raise NearlyFullError if the disk lacks the space that the database needs, also for deleting."""
+    def check_room(self, added_bytes: int = 0) -> None:
+        """Raise NearlyFullError if the disk lacks the space that the database needs, also for deleting, now or after
+        so many more bytes.
+        """
         free = free_bytes(self.settings.data)
         is_full = free < self.settings.min_free_bytes
         with self._lock:
@@ -104,10 +106,15 @@ class Quotas:
             log.warning("the disk of the data directory has enough space again")
         if is_full:
             raise NearlyFullError(f"the disk of the data directory has {bytes_text(free)} left; free some space")
+        if free - added_bytes < self.settings.min_free_bytes:
+            raise NearlyFullError(
+                f"the disk of the data directory has {bytes_text(free)} left, too little for up to "
+                f"{bytes_text(added_bytes)} more; free some space, or ask for less"
+            )
 
     def check_bytes(self, owner: str, added_bytes: int) -> None:
         """Raise QuotaError if so many more bytes exceed a user's quota; and as `check_room`."""
-        self.check_room()
+        self.check_room(added_bytes)
         limit_bytes = self.settings.max_bytes_per_user
         if limit_bytes is None:
             return
@@ -169,8 +176,8 @@ class Quotas:
             )
 
     def used_bytes(self, owner: str) -> int:
-        """Bytes of a user: uploads, finished bakes and renders, planned bytes of others; of a stopped bake the finished
-        fraction, which is kept for a resume.
+        """Bytes of a user: uploads, finished bakes and other jobs, planned bytes of others; of a stopped bake the
+        finished fraction, which is kept for a resume.
         """
         other_bytes = select(func.coalesce(func.sum(OwnedRow.bytes), 0)).where(
             OwnedRow.owner == owner, OwnedRow.kind != "bake"
@@ -203,6 +210,17 @@ class Quotas:
             self.disown(kind, object_id)
             raise
 
+    @contextmanager
+    def planned(self, owner: str, kind: OwnedKind, object_id: str, max_bytes: int) -> Iterator[None]:
+        """Check that an object of at most so many bytes fits, and assign its owner as `owner_assigned`.
+
+        Raises QuotaError, NearlyFullError.
+        """
+        with self.deciding:
+            self.check_bytes(owner, max_bytes)
+            with self.owner_assigned(owner, kind, object_id, max_bytes):
+                yield
+
     def set_bytes(self, kind: OwnedKind, object_id: str, num_bytes: int) -> None:
         """Replace the planned bytes of an object by its final ones."""
         with self._sessions.begin() as session:
@@ -231,5 +249,5 @@ def _quota_exceeded(used_bytes: int, limit_bytes: int, added_bytes: int) -> Quot
     return QuotaError(
         f"you have {bytes_text(used_bytes)} of at most {bytes_text(limit_bytes)}, and this takes "
         f"{bytes_text(added_bytes)}; "
-        "delete a scene, bake, material or render of yours first (RELUME_MAX_BYTES_PER_USER)"
+        "delete a scene, bake, material, comparison or render of yours first (RELUME_MAX_BYTES_PER_USER)"
     )

@@ -66,8 +66,7 @@ class Reservation:
             )
         return QuotaError(
             f"the file unpacks to more than the {bytes_text(limit_bytes)} left in your quota; delete a scene, a "
-            f"bake, a "
-            "material or a render of yours first (RELUME_MAX_BYTES_PER_USER)"
+            "bake, a material, a comparison or a render of yours first (RELUME_MAX_BYTES_PER_USER)"
         )
 
     def convert(self, kind: OwnedKind, object_id: str, num_bytes: int) -> None:

@@ -23,7 +23,7 @@ class TokenRow(Base):
 
 
 class OwnedRow(Base):
-    """Ownership: an upload or finished render of so many bytes, or a bake or render planned to take so many."""
+    """Ownership: an upload or finished job of so many bytes, or a job planned to take so many."""
 
     __tablename__ = "owned"
 

@@ -34,16 +34,17 @@ class CommentSync:
         while True:
             await asyncio.sleep(POLL_INTERVAL_S)
             try:
-                await self.refresh()
-                self._outage.report_recovered()
+                if await self.refresh():
+                    self._outage.report_recovered()
             except Exception as error:  # the task must survive an unavailable database
                 self._outage.report_failure(error)
 
-    async def refresh(self) -> None:
-        """Notify the rooms of scenes whose comments changed since the last poll."""
+    async def refresh(self) -> bool:
+        """Notify the rooms of scenes whose comments changed since the last poll; false if there are no rooms."""
         scenes = self._rooms.scenes()
         ask = asyncio.get_running_loop().run_in_executor
         before, self._last_marks = self._last_marks, await ask(self._threads, self._marks, scenes) if scenes else {}
         for scene, mark in self._last_marks.items():
             if scene in before and before[scene] != mark:
                 self._rooms.notify_comment(scene)
+        return bool(scenes)

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 from pydantic import Field, ValidationError
 
+from relume.core.folder_size import folder_bytes
+from relume.reference.comparison import Estimate
 from relume_server.batch.reference_passes import FIGURES
+from relume_server.jobs.render_jobs import HEAD_BYTES
 from relume_server.schemas.base import Body
 from relume_server.schemas.bodies import ComparisonFigures, ComparisonRequest
 from relume_worker.jobs.job import Job
@@ -46,12 +51,14 @@ class ComparisonJobs(JobKind[ComparisonRequest]):
 
     name, placeholder = "comparison", ComparisonRequest(bake="0" * 16, view="unknown", look={})
 
-    def __init__(self, service: JobService, data: Path) -> None:
+    def __init__(self, service: JobService, data: Path, report_bytes: Callable[[str, int], object]) -> None:
         """
         Args:
             service: runs the jobs. data: data directory.
+            report_bytes: called with the id of a finished comparison, and the size of its files in bytes.
         """
         super().__init__(service, data / "comparisons")
+        self._report_bytes = report_bytes
         self._pass_s: dict[_Kind, float] = {}
         self._pixel_s = DEFAULT_PIXEL_S
         self._sampler, self._sampling = ThreadPoolExecutor(1, "relume-pace"), threading.Lock()
@@ -132,6 +139,20 @@ class ComparisonJobs(JobKind[ComparisonRequest]):
             done = int(run.timed_step(done, "pass of a comparison", values)["passes"])
             if (pass_s := run.timer.step_s) is not None:
                 self._pass_s[_kind(job.request)] = pass_s
+        run.record(done)  # the lease may be lost by now
+        self._report_bytes(job.id, folder_bytes(run.folder))
+
+
+def planned_bytes(request: ComparisonRequest, size: tuple[int, int]) -> int:
+    """Upper bound of the size of a comparison's files: the frame, and sums and uncompressed images per set of paths.
+
+    Args:
+        request: the comparison. size: size of the image, pixels.
+    """
+    width, height = size
+    pixels, num_sets = width * height, len({request.paths, "method"})
+    frame_bytes = pixels * 3 * np.dtype(np.float32).itemsize + HEAD_BYTES
+    return frame_bytes + num_sets * (Estimate.planned_bytes(height, width) + 2 * (3 * pixels + HEAD_BYTES))
 
 
 def _kind(request: ComparisonRequest) -> _Kind:

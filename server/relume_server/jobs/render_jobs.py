@@ -108,7 +108,7 @@ class RenderJobs(JobKind[RenderRequest]):
         frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
         video = str(self.video_path(job)) if job.request.format == "mp4" else None
         values = {"frames": frames, "archive": str(self.archive_path(job)), "video": video, "fps": job.request.fps}
-        run.step("archive of a batch", values)
+        run.step("archive of a batch", values, num_bytes=folder_bytes(run.folder))
         run.record(job.total)  # the lease may be lost by now
         self._report_bytes(job.id, folder_bytes(run.folder))
 

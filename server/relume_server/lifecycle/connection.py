@@ -17,6 +17,8 @@ MAX_HEADERS = 200
 HEAD_SECONDS = 10.0
 BODY_SECONDS = 30.0
 MIN_BODY_BYTES_PER_SECOND = 10_000
+WRITE_SECONDS = 120.0
+MIN_WRITE_BYTES = 1 << 16
 
 _CLOSE = b"Connection: close\r\nContent-Length: 0\r\n\r\n"
 _BUSY = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\n" + _CLOSE
@@ -25,20 +27,23 @@ _LARGE_HEAD = b"HTTP/1.1 431 Request Header Fields Too Large\r\n" + _CLOSE
 
 
 class Connection(HttpToolsProtocol):
-    """A connection with limits: size and time of the head, minimum rate of the body.
+    """A connection with limits: size and time of the head, minimum rate of the body and of unsent responses.
 
     A head may exceed its limit by one read, 256 KiB. A body may take `BODY_SECONDS`, plus one second for each
     `MIN_BODY_BYTES_PER_SECOND` received. Time in which the app does not read is not counted.
+    Of a response that waits, at least `MIN_WRITE_BYTES` must be sent within `WRITE_SECONDS`, or all of it.
     """
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
         self._is_in_head, self._num_head_bytes, self._num_header_bytes, self._num_body_bytes = True, 0, 0, 0
         self._deadline: asyncio.TimerHandle | None = None
+        self._write_deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """See `asyncio.Protocol`; a connection above the limit gets an error and is closed."""
         super().connection_made(transport)
+        transport.set_write_buffer_limits(high=0)  # writing is paused, and limited in time, by any unsent byte
         if len(self.connections) > MAX_CONNECTIONS:
             self._end(_BUSY)
         else:
@@ -47,6 +52,7 @@ class Connection(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """See `asyncio.Protocol`."""
         self._expect_nothing()
+        self._end_write_deadline()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -94,7 +100,36 @@ class Connection(HttpToolsProtocol):
     def handle_websocket_upgrade(self) -> None:
         """Hand the connection over to the WebSocket protocol."""
         self._expect_nothing()
+        self._end_write_deadline()
+        self.transport.set_write_buffer_limits()
         super().handle_websocket_upgrade()
+
+    def pause_writing(self) -> None:
+        """See `asyncio.Protocol`; the client has `WRITE_SECONDS`."""
+        super().pause_writing()
+        self._limit_write()
+
+    def resume_writing(self) -> None:
+        """See `asyncio.Protocol`."""
+        self._end_write_deadline()
+        super().resume_writing()
+
+    def _limit_write(self) -> None:
+        """Check in `WRITE_SECONDS` that enough has been sent."""
+        num_unsent = self.transport.get_write_buffer_size()
+        self._write_deadline = self.loop.call_later(WRITE_SECONDS, self._check_write, num_unsent)
+
+    def _end_write_deadline(self) -> None:
+        if self._write_deadline is not None:
+            self._write_deadline.cancel()
+            self._write_deadline = None
+
+    def _check_write(self, num_unsent: int) -> None:
+        """Close without sending the rest if too little of so many bytes has been sent."""
+        if num_unsent - self.transport.get_write_buffer_size() < MIN_WRITE_BYTES:
+            self.transport.abort()
+        else:
+            self._limit_write()
 
     def _expect(self, seconds: float) -> None:
         """Check in so many seconds that the expected data has been received."""

@@ -217,7 +217,7 @@ class BakeRequest(Body):
     """
 
     scene: Id
-    method: Name = "direct"
+    method: Name = "gather"
     views: Annotated[list[Name | CameraBody], Field(min_length=1, max_length=64)] | None = None
     preset: Preset | None = None
     aspect: Annotated[float, Field(ge=0.125, le=8)] | None = None

@@ -113,7 +113,9 @@ def grounded(server: Server, browser: Browser) -> Iterator[Editor]:
     try:
         assert [material["shadow_catcher"] for material in made["materials"]] == [False, False, False, True]
         expect(page.get_by_role("button", name=f"Add ground plane to {made['name']}")).to_have_count(0)
-        bake = server.call("/api/bakes", {"scene": made["id"], "views": ["front"], "size": SIZE, "lights": 200})
+        bake = server.call(
+            "/api/bakes", {"scene": made["id"], "method": "direct", "views": ["front"], "size": SIZE, "lights": 200}
+        )
         while bake["state"] in ("queued", "running"):
             time.sleep(0.1)
             bake = server.call(f"/api/bakes/{bake['id']}")

@@ -95,7 +95,7 @@ def wait_until_cancelled(server: Server, bake: str) -> None:
 @pytest.mark.slow
 def test_a_bake_says_what_it_is_at_and_ends_where_it_is_cancelled(editor: Editor, server: Server) -> None:
     (scene,) = server.call("/api/scenes")
-    recipe = {"scene": scene["id"], "views": ["front", "left"], "size": SIZE, "lights": 2000}
+    recipe = {"scene": scene["id"], "method": "direct", "views": ["front", "left"], "size": SIZE, "lights": 2000}
     bake = server.call("/api/bakes", recipe)
     expect(editor.page.locator(".status .bake")).to_contain_text("baking, ")
     editor.page.get_by_role("button", name="Cancel").click()

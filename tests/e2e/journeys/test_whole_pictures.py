@@ -92,7 +92,9 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, s
 
 def bake(server: Server, scene: str, size: tuple[int, int]) -> str:
     """Bake two views, wait, and say its id."""
-    made = server.call("/api/bakes", {"scene": scene, "views": ["front", "left"], "size": size, "lights": 200})
+    made = server.call(
+        "/api/bakes", {"scene": scene, "method": "direct", "views": ["front", "left"], "size": size, "lights": 200}
+    )
     deadline = time.monotonic() + WAIT_MS / 1e3
     while made["state"] != "ready":
         assert time.monotonic() < deadline

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from relume.core.errors import CancelledError
+from relume.store.disk_space import check_disk_space
 from relume_worker.jobs.job import Job, Request, noun
 from relume_worker.jobs.job_service import JobService
 from relume_worker.jobs.step import Step
@@ -49,13 +50,21 @@ class JobRun(Generic[Request]):
         return not is_over and self._service.ledger.holds_lease(self.job.id)
 
     def step(
-        self, kind: str, values: Mapping[str, Any], report: Callable[[float], object] = lambda fraction: None
+        self,
+        kind: str,
+        values: Mapping[str, Any],
+        report: Callable[[float], object] = lambda fraction: None,
+        num_bytes: int = 0,
     ) -> Mapping[str, Any]:
         """Run a step in another process, while the job is wanted.
 
         Args:
             kind: kind of the step. values: its arguments. report: called with the fraction done.
+            num_bytes: size of the files that it writes, if known.
+        Raises:
+            DiskFullError: they do not fit; files of earlier steps stay.
         """
+        check_disk_space(self.folder, num_bytes, f"the files of a {noun(self._kind)}")
         claim = str(self.folder), self._service.ledger.owner
         step = Step(kind, self._is_first, values, claim, self.job.user)
         return self._service.run_step(step, report, self.is_needed)

@@ -49,6 +49,7 @@ class JobService:
         self._wake, self._closing, self._ended = threading.Event(), threading.Event(), threading.Event()
         self._outage = DatabaseError(log, "the queue of jobs cannot be read or written")
         self._run_outage = DatabaseError(log, "a job cannot be recorded")
+        self._lease_outage = DatabaseError(log, "the leases of jobs cannot be renewed")
         self._runs: dict[str, tuple[Waiting, threading.Thread]] = {}
         self._claimer = threading.Thread(target=self._claim_all, name="relume-jobs", daemon=True)
         self._renewer = threading.Thread(target=self._renew_leases, name="relume-leases", daemon=True)
@@ -189,5 +190,6 @@ class JobService:
             try:
                 if self._runs:
                     self.ledger.renew_leases()
+                    self._lease_outage.report_recovered()
             except Exception as error:  # a short outage costs no lease
-                self._outage.report_failure(error)
+                self._lease_outage.report_failure(error)

@@ -4,19 +4,7 @@ import { endsWith, isImportable, isSceneFile, MEASURED_SUFFIXES } from "./sceneF
 
 /** Unsupported formats of measured materials. */
 const OTHER_MEASURED_SUFFIXES = [".merl", ".mbdf"];
-const UNSUPPORTED_SCENE_SUFFIXES = [
-  ".fbx",
-  ".blend",
-  ".usd",
-  ".usda",
-  ".usdc",
-  ".usdz",
-  ".dae",
-  ".stl",
-  ".3ds",
-  ".max",
-  ".abc",
-];
+export const UNSUPPORTED_SCENE_SUFFIXES = [".fbx", ".blend", ".dae", ".3ds", ".max", ".abc"];
 
 const MAX_LISTED_FILES = 5;
 
@@ -33,7 +21,7 @@ function listFileNames(files: readonly DroppedFile[]): string {
 
 const MEASURED_MESSAGE =
   "Open a scene and drop materials on the Library: MaterialX (.mtlx, .zip), MERL (.binary), RGL (.bsdf), Cornell (.brdf) or BTF (.btf, .zip).";
-const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY or ZIP.";
+const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY, STL, USD or ZIP.";
 
 /** Advice for rejected files, by the type of the first. */
 function rejectionReason([first]: readonly DroppedFile[], fallback: string): string {

@@ -2,8 +2,9 @@
 import type { DroppedFile } from "./dropTypes";
 import { findReferences } from "./references";
 
+const LAYER_SUFFIXES = [".usd", ".usda", ".usdc"];
 /** Scene formats of the server. */
-export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".stl", ".zip"];
+export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".stl", ...LAYER_SUFFIXES, ".usdz", ".zip"];
 export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
 export const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".dds", ".tif", ".tiff", ".gif"];
 /** Suffixes of companion files. */
@@ -64,9 +65,9 @@ export async function sortFiles(files: readonly DroppedFile[]): Promise<ImportSe
   const byPath = new Map(files.map((each) => [each.path.toLowerCase(), each]));
   const findFile = (path: string) => byPath.get(path.toLowerCase());
   const images = files.filter(({ path }) => endsWith(path, IMAGE_SUFFIXES));
-  const scenes = await Promise.all(
-    files.filter(isSceneFile).map(async (scene) => ({ ...scene, ...(await findReferences(scene, findFile, images)) })),
-  );
+  const layers = files.filter(({ path }) => endsWith(path, LAYER_SUFFIXES));
+  const read = async (scene: DroppedFile) => ({ ...scene, ...(await findReferences(scene, findFile, images, layers)) });
+  const scenes = await Promise.all(files.filter(isSceneFile).map(read));
   scenes.sort((a, b) => a.path.localeCompare(b.path, undefined, { numeric: true }));
   return { scenes, environment: environments.at(-1)?.file ?? null };
 }

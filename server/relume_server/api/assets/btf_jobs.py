@@ -14,7 +14,7 @@ from fastapi import APIRouter, File, Form, Query, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
 from relume.assets.asset_store import check_name
-from relume.synthetic_btf.synthesize import MESH
+from relume.synthetic_btf.synthesize import MESH, planned_bytes
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import MAX_LISTED, PageDep
 from relume_server.auth.reservations import Reservation
@@ -86,10 +86,9 @@ async def make_synthetic_btf(
     """Queue the rendering of a synthetic BTF from a built-in geometry."""
     name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
     btf_request = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
-    async with services.import_queue.reserving(
-        caller.name, 1
-    ) as reservation:  # its final size is unknown until it is made
-        identity = await run_in_threadpool(_submit, btf_request, 0, reservation, services)
+    num_bytes = planned_bytes(request.size)  # until it is ready
+    async with services.import_queue.reserving(caller.name, num_bytes) as reservation:
+        identity = await run_in_threadpool(_submit, btf_request, num_bytes, reservation, services)
     return await run_in_threadpool(_answer, identity, services, response)
 
 
@@ -118,8 +117,10 @@ def _submit_mesh(mesh: UploadFile, btf_request: BtfRequest, reservation: Reserva
         path = save_upload(mesh, Path(folder) / UPLOAD_FILE)
         import_request = ImportRequest.create(services.settings, "tile", path, btf_request.name)
         services.import_queue.read(reservation, replace(import_request, period=btf_request.period), Path(folder))
+        num_bytes = upload_bytes(mesh) + planned_bytes(btf_request.size)
+        reservation.reserve(num_bytes)
         return _submit(
-            btf_request, upload_bytes(mesh), reservation, services, lambda into: shutil.move(path, into / UPLOAD_FILE)
+            btf_request, num_bytes, reservation, services, lambda into: shutil.move(path, into / UPLOAD_FILE)
         )
 
 
@@ -158,6 +159,7 @@ def stop_btf_job(job: Id, services: ServicesDep, delete_files: bool = False) -> 
 @router.post("/{job}/resume", status_code=202)
 def resume_btf_job(job: Id, services: ServicesDep) -> BtfJobBody:
     """Resume a stopped job."""
+    services.access.quotas.check_room()
     services.btfs.resume(job)
     return _body(services.btfs.get(job), services)
 

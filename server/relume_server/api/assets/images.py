@@ -62,16 +62,17 @@ async def put_metalness(
 ) -> MetalnessBody:
     """Make two images from a metallic map and the base color, and return the material's terms that use them."""
     data, folder = services.settings.data, images_path(services.settings.data)
-    await run_in_threadpool(services.access.quotas.check_bytes, caller.name, 0)
     terms = [complete_term(("terms", k), term, None) for k, term in enumerate(request.terms)]
 
     def read(scene: str, material: str) -> Material:
         return load_material(fetch_if_missing(scene_path(data, scene)), material)
 
-    compute_terms = partial(with_metalness, folder, terms, image, request.scene, request.material, read)
-    metallic_terms = await services.import_queue.run_in_slot(caller.name, compute_terms)
-    for name in sorted({texture for term in metallic_terms if is_user_image(texture := term["texture"])}):
-        await run_in_threadpool(_assign_owner, services, caller, folder, name.removeprefix(IMAGES.prefix))
+    args = folder, terms, image, request.scene, request.material, read
+    async with services.import_queue.reserving(caller.name, 0) as reservation:
+        compute_terms = partial(with_metalness, *args, reservation.reserve)
+        metallic_terms = await services.import_queue.run_in_slot(caller.name, compute_terms)
+        for name in sorted({texture for term in metallic_terms if is_user_image(texture := term["texture"])}):
+            await run_in_threadpool(_assign_owner, services, caller, folder, name.removeprefix(IMAGES.prefix))
     return MetalnessBody(terms=metallic_terms)
 
 
