@@ -12,6 +12,8 @@ from relume_cli.options import Data
 from relume_cli.terminal.printing import Json, print_result
 
 if TYPE_CHECKING:
+    from relume.assets.btf.btf_store import BtfRecord
+    from relume.assets.measured.measured_store import MaterialRecord
     from relume_cli.database.actions import OpenFolder
 
 Kind = Literal["scene", "bake", "look", "environment", "material", "image", "render", "comparison", "btf-job"]
@@ -132,16 +134,19 @@ def _material(data_folder: OpenFolder, name: str) -> Deletable:
     from relume_worker.paths import btfs_path, materials_path
 
     measured, btfs = materials_path(data_folder.settings.data), btfs_path(data_folder.settings.data)
-    names = {record.data: record.name for record in (*measured_store.records(measured), *btf_store.records(btfs))}
+    records: list[MaterialRecord | BtfRecord] = [*measured_store.records(measured), *btf_store.records(btfs)]
+    names = {record.data: record.name for record in records}
     material = pick("measured material or BTF", name, list(names.items()), "fits of the library cannot be deleted")
-    store, folder, owned = measured_store.STORE, measured, "material"
-    if material.startswith(btf_store.STORE.prefix):
-        store, folder, owned = btf_store.STORE, btfs, "btf"
-    identity = material.removeprefix(store.prefix)
 
     def remove() -> None:
-        store.remove(folder, identity)
-        data_folder.access.quotas.disown(owned, identity)
+        if material.startswith(btf_store.STORE.prefix):
+            identity = material.removeprefix(btf_store.STORE.prefix)
+            btf_store.STORE.remove(btfs, identity)
+            data_folder.access.quotas.disown("btf", identity)
+        else:
+            identity = material.removeprefix(measured_store.STORE.prefix)
+            measured_store.STORE.remove(measured, identity)
+            data_folder.access.quotas.disown("material", identity)
 
     return Deletable(material, f"material {material} ({names[material]})", remove)
 

@@ -72,6 +72,32 @@ def test_a_light_is_placed_by_keys_alone_and_by_none_where_escape_is_pressed(edi
     expect(page.locator(".light .name", has_text="Spot")).to_be_focused()
 
 
+WITHIN_SCROLLER = """row => {
+  let list = row.parentElement;
+  while (list.scrollHeight <= list.clientHeight) list = list.parentElement;
+  const [inner, outer] = [row, list].map((element) => element.getBoundingClientRect());
+  return list !== document.documentElement && inner.top >= outer.top && inner.bottom <= outer.bottom;
+}"""
+
+
+def test_a_new_light_is_the_only_selected_row_and_is_scrolled_to(editor: Editor) -> None:
+    page = editor.page
+    page.set_viewport_size({"width": 900, "height": 600})
+    selected = page.locator("[role=option][aria-selected=true], .light.selected")
+    page.get_by_role("option", name="Ball").click()
+    expect(selected).to_have_count(1)
+    for number in range(1, 7):
+        start_adding(editor, "Point")
+        editor.canvas.click()  # a row that is placed by keys is focused, which scrolls to it
+        expect(page.locator(".light")).to_have_count(number)
+        expect(selected).to_have_count(1)
+        expect(page.locator(".light.selected")).to_have_count(1)
+    assert page.locator(".light.selected").evaluate(WITHIN_SCROLLER)
+    page.get_by_role("option", name="Ball").click()
+    expect(selected).to_have_count(1)
+    expect(page.locator(".light.selected")).to_have_count(0)
+
+
 def test_a_handle_is_pulled_in_one_step_across_the_picture_and_away(editor: Editor) -> None:
     add_by_click(editor, "Spot")
     before, start = editor.pixels(), numbers(editor, "Position")
