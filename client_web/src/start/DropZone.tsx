@@ -110,7 +110,7 @@ export function DropZone({ onImported }: { onImported: (scenes: ImportedScene[])
         , or <FileInput label="choose a folder" folder onFiles={addFiles} />.
       </p>
       <p class="quiet">
-        Scenes: GLB, glTF, OBJ, PLY (with textures) or ZIP. HDRI: HDR or EXR. Without one, studio lighting is used.
+        Scenes: GLB, glTF, OBJ, PLY, STL, USD or ZIP. HDRI: HDR or EXR. Without one, studio lighting is used.
       </p>
       <ChosenFiles
         scenes={scenes}
