@@ -272,7 +272,7 @@ def test_turntable_writes_numbered_frames_and_resumes(
     assert "--method probes" in capsys.readouterr().err
     assert main(["bake", "quad", "--view", "front", "--probes", "200", *TINY]) == 1
     assert "method direct has no probes" in capsys.readouterr().err
-    assert main(["bake", "quad", "--view", "front", "--method", "probes", "--probes", "200", *TINY]) == 0
+    assert main(["bake", "quad", "--view", "front", *TINY, "--method", "probes", "--probes", "200"]) == 0
     assert main(turntable) == 0
     frames = [np.asarray(Image.open(folder / f"{k:04d}.png")) for k in range(3)]
     assert frames[0].shape == (24, 32, 3)

@@ -145,7 +145,7 @@ def test_lobes_narrower_than_the_light_spacing_preserve_energy(model, params):
 def test_a_narrow_lobe_within_wide_lights_is_shaded():
     few, (term, bands) = tessellate_environment(studio(), 200), curves_of("cook_torrance", {"sigma": 0.01})
     receivers = everything_visible(ref.make_random_receivers(4, few.num_lights, seed=4), few)
-    expected = ref.project(term, bands, None, few, receivers, depth=6)[:, 0]
+    expected = ref.project(term, bands, None, few, receivers, depth=8)[:, 0]  # 0.2 % off itself; 0.6 % with 6
     assert error(shaded(term, bands, replace(few, codes=None), receivers), expected) < 4e-3
 
 

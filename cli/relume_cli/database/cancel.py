@@ -30,7 +30,7 @@ def cancel(
     as_json: Json = False,
     data: Data = None,
 ) -> int:
-    """Cancel queued and running bakes, renders, comparisons and BTF jobs, on any machine.
+    """Cancel bakes, renders, comparisons and BTF jobs.
 
     Finished tasks are saved: the same relume bake resumes. Fails if one had already ended.
     """

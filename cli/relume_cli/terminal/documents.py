@@ -29,6 +29,7 @@ def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str
         "variants": [{"name": name, "look": look} for name, look in record.variants.items()],
         "warnings": [warning.document() for warning in record.warnings],
         "triangles": record.num_triangles,
+        "size": None if record.size is None else list(record.size),
         "import_options": dict(record.import_options),
         "bakes": [status.id for status in bakes],
     }

@@ -44,8 +44,8 @@ const OPTIONS: { readonly [Key in keyof ImportOptions]: Omit<ImportOption<Key>, 
     ],
   },
   light_unit: {
-    label: "Light unit",
-    help: "Unit of the lights in a glTF file; Blender writes W/sr as “Unitless”, and W as “Raw”",
+    label: "Lights",
+    help: "Unit of lights in a glTF file; Blender writes W/sr as “Unitless”, and W as “Raw”",
     choices: [
       { value: "file", label: "As in file" },
       { value: "W/sr", label: "W/sr" },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from relume.scene_io.surfaces.layers import (
+from relume.scene_io.surfaces.base_layers import (
     WHITE,
     TransmissionLayer,
     anisotropic_highlight,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from relume.scene_io.surfaces.layers import WHITE, transmissive_base
+from relume.scene_io.surfaces.base_layers import WHITE, transmissive_base
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Color, Rgb, SurfaceInputs, scaled
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters

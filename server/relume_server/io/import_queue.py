@@ -113,16 +113,15 @@ class ImportQueue:
         target = scene_path(self._settings.data, identity)
         if store is not None:
             target = store[1](self._settings.data) / store[0].path(into, identity).name
-        num_bytes = _checked_bytes(into)
+        num_bytes = _checked_bytes(into / identity)
         if not target.exists():  # otherwise it takes no additional space
-            reservation.reserve(num_bytes)
+            reservation.reserve(num_bytes + folder_bytes(into / IMAGES_FOLDER))
         self._adopt_images(reservation.owner, into / IMAGES_FOLDER)
         if store is None:
             self._register_scene(into, identity, target)
         else:
             store[0].adopt(target.parent, into / identity)
-        own_bytes = num_bytes if store is None else folder_bytes(target)
-        reservation.convert(store[2] if store else "scene", identity, own_bytes)
+        reservation.convert(store[2] if store else "scene", identity, num_bytes)
 
     def _adopt_images(self, owner: str, folder: Path) -> None:
         """Move the images of imported materials into place, and assign them to their owner."""

