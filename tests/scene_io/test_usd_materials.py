@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from environment_files import write_map
 from glb_builder import DIELECTRIC_TRANSMISSION, QUAD_UVS, Glb
 from texture_values import get_texture_values
 from usd_text import BOUND, CHECKER, RGB, ST, WHITE, Files, imported, painted, png, quad, texture, usda
@@ -168,6 +170,16 @@ def test_emission_is_a_light_with_the_mean_of_its_image() -> None:
     np.testing.assert_allclose(light.fields["emission"], 0.5)
     constant = imported(usda(painted("color3f inputs:emissiveColor = (3, 2, 1)")))
     np.testing.assert_allclose(constant.lights[0].fields["emission"], [3, 2, 1])
+
+
+def test_images_of_radiance_are_read_and_clamped_to_the_range_of_textures(tmp_path: Path) -> None:
+    connected = "color3f inputs:diffuseColor.connect = </Paint/Image.outputs:rgb>"
+    write_map(tmp_path / "c.exr", np.array([[[0.25, 0.5, 4.0]]], np.float32))
+    files = Files({"c.exr": (tmp_path / "c.exr").read_bytes()})
+    scene = imported(usda(painted(connected, texture("Image", "c.exr"))), files)
+    texels = get_texture_values(scene.materials[0].textures["diffuse"])
+    np.testing.assert_allclose(texels.reshape(-1, 3)[0], [0.25, 0.5, 1], atol=4e-3)
+    assert "Values of “c.exr” above 1 are clamped in textures." in scene.warnings
 
 
 TRANSFORMED = """

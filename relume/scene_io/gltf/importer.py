@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
+from relume.core.import_warnings import approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
-from relume.scene.finalize import finalize
+from relume.scene.finalize import finalize, no_triangles
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import Camera, Mesh, Scene
 from relume.scene.textured_vertex_colors import TexturedColors, draw_textured_colors
@@ -46,7 +45,6 @@ from relume.scene_io.referenced_files import Companions, NoFiles
 F64 = NDArray[np.float64]
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
 MAX_INSTANCES = 100_000  # primitives times the nodes and instances that show them
-_MAX_FAULTS = 240  # characters of faults in an error
 _DEFAULT_MATERIAL = GltfMaterial(name="default")
 _MAX_SEPARATE_MESHES = 2_000  # beyond, meshes are merged by material: each has its own arrays in files and memory
 
@@ -127,9 +125,7 @@ class _SceneBuilder:
         if len(self.meshes) > _MAX_SEPARATE_MESHES:
             self.meshes = merge_by_material(self.meshes)
         if not self.meshes:
-            raise SceneError(
-                f"the scene has no triangles with an area{_list_faults(self.warnings)}; export at least one mesh"
-            )
+            raise SceneError(no_triangles(self.warnings))
         emissions = [np.array(read_material.emission) for read_material in self.materials]
         scene_materials = [read_material.material for read_material in self.materials]
         lit = self._collector.emissive_light(scene_materials, emissions, self.meshes)
@@ -371,15 +367,3 @@ class _SceneBuilder:
         if num_animations := len(self._document.root.animations):
             animations = "1 animation was" if num_animations == 1 else f"{num_animations} animations were"
             self.warnings.append(ignored(f"{animations} ignored: objects are shown in their rest pose."))
-
-
-def _list_faults(warnings: Sequence[ImporterWarning]) -> str:
-    """The faults of a file in brackets, as many as fit into an error."""
-    faults = [str(warning).rstrip(".") for warning in warnings if warning.severity == "unsupported"]
-    total, listed = 0, list[str]()
-    for fault in faults:
-        total += len(fault)
-        if total <= _MAX_FAULTS or not listed:
-            listed.append(fault[:_MAX_FAULTS])
-    more = f"; and {len(faults) - len(listed):,} more" if len(faults) > len(listed) else ""
-    return f" ({'; '.join(listed)}{more})" if listed else ""

@@ -136,10 +136,12 @@ class UsdImages:
             if not data.startswith((EXR_MAGIC, HDR_MAGIC)):
                 return self._decoder.decode(data, label)
             suffix = ".exr" if data.startswith(EXR_MAGIC) else ".hdr"
-            pixels = np.maximum(np.nan_to_num(read_pixels(data, suffix, label, _check_size)), 0)
+            values, predicates = read_pixels(data, suffix, label, _check_size)
         except SceneError as error:
             self._warnings.append(unsupported(f"Skipped “{name}”: {error}."))
             return None
+        pixels: F32 = np.maximum(np.nan_to_num(values), 0)
+        self._warnings.extend(ImporterWarning(f"“{name}” {each}", each.severity) for each in predicates)
         if pixels.max() > 1:
             self._warnings.append(approximated(f"Values of “{name}” above 1 are clamped in textures."))
         return pixels
