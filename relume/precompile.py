@@ -46,6 +46,7 @@ from relume.reference.btf_surfaces import sample_btf_surface
 from relume.scene.examples.still_life import demo_scene
 from relume.scene.model import Scene
 from relume.scene.scene_folder import load_scene, save_scene
+from relume.scene_io.obj_ply.weld import compile_kernels
 from relume.store.bake_protocol import BakeMethod, Recipe
 from relume.store.run_bake import bake_in_process
 
@@ -77,6 +78,7 @@ def _compile_pictures() -> None:
         _exercise(METHODS["direct"], scene, folder, ANALYTIC)
         _compare(scene)
     _evaluate_measured()
+    compile_kernels()
 
 
 def _compile_rays() -> None:

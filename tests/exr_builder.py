@@ -44,6 +44,34 @@ def write_exr(path, *parts):
     return path.read_bytes()
 
 
+def exr_attribute(name, kind, value):
+    """An attribute of a header; `kind`: its type, `value`: its bytes."""
+    return f"{name}\0{kind}\0".encode() + struct.pack("<I", len(value)) + value
+
+
+def required_attributes(width, height, channels, compression):
+    """The attributes that each file has.
+
+    Args:
+        width, height: of both windows. channels: of halves: the distance between their pixels, by name.
+        compression: its byte.
+    """
+    listed = b"".join(name.encode() + b"\0" + struct.pack("<4I", 1, 0, step, step) for name, step in channels.items())
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    return b"".join(
+        [
+            exr_attribute("channels", "chlist", listed + b"\0"),
+            exr_attribute("compression", "compression", compression),
+            exr_attribute("dataWindow", "box2i", window),
+            exr_attribute("displayWindow", "box2i", window),
+            exr_attribute("lineOrder", "lineOrder", b"\0"),
+            exr_attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
+            exr_attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
+            exr_attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
+        ]
+    )
+
+
 def luminance_chroma_exr(rgb, weights):
     """An uncompressed file with the channels Y, RY and BY (ImfRgbaYca.h), the latter two for every other pixel.
 
@@ -54,27 +82,8 @@ def luminance_chroma_exr(rgb, weights):
     planes = {"BY": ((rgb[..., 2] - y) / y)[::2, ::2], "RY": ((rgb[..., 0] - y) / y)[::2, ::2], "Y": y}
     height, width = y.shape
 
-    def attribute(name, kind, value):
-        return f"{name}\0{kind}\0".encode() + struct.pack("<I", len(value)) + value
-
-    channels = b"".join(
-        name.encode() + b"\0" + struct.pack("<4I", 1, 0, *2 * [width // plane.shape[1]])
-        for name, plane in planes.items()
-    )
-    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
-    header = b"\x76\x2f\x31\x01\x02\0\0\0" + b"".join(
-        [
-            attribute("channels", "chlist", channels + b"\0"),
-            attribute("compression", "compression", b"\0"),
-            attribute("dataWindow", "box2i", window),
-            attribute("displayWindow", "box2i", window),
-            attribute("lineOrder", "lineOrder", b"\0"),
-            attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
-            attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
-            attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
-            b"\0",
-        ]
-    )
+    channels = {name: width // plane.shape[1] for name, plane in planes.items()}
+    header = b"\x76\x2f\x31\x01\x02\0\0\0" + required_attributes(width, height, channels, b"\0") + b"\0"
     lines = [
         b"".join(
             p[row * len(p) // height].astype("<f2").tobytes() for p in planes.values() if row % (height // len(p)) == 0

@@ -56,6 +56,15 @@ class ImporterWarning(str):
         return {"text": str(self), "severity": self.severity, "where": self.location}
 
 
+def with_subject(subject: str, predicates: Iterable[ImporterWarning]) -> list[ImporterWarning]:
+    """Make sentences of warnings without a subject, as readers of pixels return them.
+
+    Args:
+        subject: what they are about, such as a quoted name. predicates: the rest of each sentence.
+    """
+    return [ImporterWarning(f"{subject} {predicate}", predicate.severity) for predicate in predicates]
+
+
 def by_severity(warnings: Iterable[ImporterWarning]) -> list[ImporterWarning]:
     """Sort warnings, the most severe first."""
     return sorted(warnings, key=lambda warning: SEVERITIES.index(warning.severity))

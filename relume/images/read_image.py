@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported, with_subject
 from relume.image_io.decode import Decoder
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
 from relume.scene.model import Texture, TextureEncoding
@@ -64,8 +64,7 @@ def _check_size(label: str, width: int, height: int) -> None:
 
 def _read_exr(data: bytes, label: str, quoted_label: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
     pixels, predicates = read_pixels(data, ".exr", label, partial(_check_size, label))
-    subject = quoted_label[0].upper() + quoted_label[1:]
-    warnings = [ImporterWarning(f"{subject} {predicate}", predicate.severity) for predicate in predicates]
+    warnings = with_subject(quoted_label[0].upper() + quoted_label[1:], predicates)
     broken = np.isnan(pixels).any(axis=-1, keepdims=True)
     if broken.any():
         warnings.append(unsupported(f"{int(broken.sum()):,} NaN texels of {quoted_label} were made black."))

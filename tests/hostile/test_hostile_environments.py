@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 import pytest
+from exr_builder import exr_attribute, required_attributes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -76,26 +77,11 @@ def test_environment_refuses_exr_sizes_before_reading(window: tuple[int, int, in
 
 def _exr_claiming(width: int, height: int, tile: tuple[int, int] | None) -> bytes:
     """An EXR file with a header only: half RGB, zip, no pixels."""
-
-    def attribute(name: str, kind: str, value: bytes) -> bytes:
-        return f"{name}\0{kind}\0".encode() + struct.pack("<I", len(value)) + value
-
-    channels = b"".join(name + b"\0" + struct.pack("<4I", 1, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
-    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
-    attributes = [
-        attribute("channels", "chlist", channels),
-        attribute("compression", "compression", b"\3"),
-        attribute("dataWindow", "box2i", window),
-        attribute("displayWindow", "box2i", window),
-        attribute("lineOrder", "lineOrder", b"\0"),
-        attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
-        attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
-        attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
-    ]
+    attributes = required_attributes(width, height, dict.fromkeys("BGR", 1), b"\3")
     if tile is not None:
-        attributes.append(attribute("tiles", "tiledesc", struct.pack("<IIB", *tile, 0)))
+        attributes += exr_attribute("tiles", "tiledesc", struct.pack("<IIB", *tile, 0))
     version = struct.pack("<I", 2 | (0x200 if tile is not None else 0))
-    return b"\x76\x2f\x31\x01" + version + b"".join(attributes) + bytes(101)
+    return b"\x76\x2f\x31\x01" + version + attributes + bytes(101)
 
 
 @pytest.mark.parametrize("tile", [None, (64, 64), (16_384, 8_192), (2**31 - 1, 2**31 - 1), (1, 1)])

@@ -235,18 +235,24 @@ def test_references_show_the_normal_map(plain, named):
 
 @pytest.mark.slow
 def test_free_cameras_show_the_normal_map(plain, named, tmp_path):
-    """With direct light, and with all light."""
-    bare, baked = (
-        open_small_bake(s, "probes", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named)))
-    )
-    for show, tolerance in (("direct", 2e-3), ("all", 0.015)):
-        light = {"transport": {"show": show}}
-        actual, expected = (
-            render_exact(transfer, normal_mapped(plain, name, **light), "probes")
-            for transfer, name in ((bare, named), (baked, None))
+    """With direct light, and with all light. The latter has other rays in both bakes: the median of three seeds."""
+    errors = {"direct": [], "all": []}
+    for seed in range(3):
+        scene = replace(plain, id=f"{seed:016x}")  # seeds random numbers
+        bare, baked = (
+            open_small_bake(s, "probes", tmp_path / f"{seed}-{k}")
+            for k, s in enumerate((scene, with_own(scene, named)))
         )
-        assert relative_rmse(actual, expected) < tolerance
-        assert relative_rmse(render_exact(bare, normal_mapped(plain, None, **light), "probes"), expected) > 0.3
+        for show, of_seeds in errors.items():
+            light = {"transport": {"show": show}}
+            actual, expected = (
+                render_exact(transfer, normal_mapped(plain, name, **light), "probes")
+                for transfer, name in ((bare, named), (baked, None))
+            )
+            of_seeds.append(relative_rmse(actual, expected))
+            assert relative_rmse(render_exact(bare, normal_mapped(plain, None, **light), "probes"), expected) > 0.3
+    assert max(errors["direct"]) < 2e-3
+    assert np.median(errors["all"]) < 0.015
 
 
 @pytest.mark.slow

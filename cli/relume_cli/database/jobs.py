@@ -89,11 +89,12 @@ def find_job(data_folder: OpenFolder, noun: str, name: str) -> JobRow:
 
 def find_any_job(data_folder: OpenFolder, name: str) -> tuple[str, JobRow] | None:
     """Find a job of any kind by its id: its noun and row; None if there is none."""
-    for noun, table in job_tables().items():
-        for row in job_rows(data_folder, table):
-            if row.id == name:
-                return noun, row
-    return None
+    from relume_worker.database.models import JobRow
+
+    nouns = {table.name: noun for noun, table in job_tables().items()}
+    with data_folder.service.ledger.sessions() as session:
+        row = session.get(JobRow, name)
+    return None if row is None or row.kind not in nouns else (nouns[row.kind], row)
 
 
 def delete_job(data_folder: OpenFolder, noun: str, identity: str) -> None:

@@ -12,7 +12,7 @@ from relume.assets.environments.environment import Environment
 from relume.assets.environments.panoramas import find_panorama, is_panorama_size, to_equirectangular
 from relume.assets.environments.radiance_file import is_radiance, read_radiance_file
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported, with_subject
 from relume.image_io.downsample import downsample
 from relume.image_io.orientation import TRANSPOSED, orient
 from relume.image_io.primaries import convert
@@ -100,10 +100,7 @@ class _MapReader:
         return f"environment {self._name!r}"
 
     def _add_warnings(self, predicates: Iterable[ImporterWarning]) -> None:
-        self._warnings += [
-            ImporterWarning(f"Environment {quote(self._name)} {predicate}", predicate.severity)
-            for predicate in predicates
-        ]
+        self._warnings += with_subject(f"Environment {quote(self._name)}", predicates)
 
     def _read_strips(self, reader: LinearReader, matrix: NDArray[np.float64] | None) -> None:
         """Read all strips. matrix: conversion to radiance in Rec. 709; None if the decoder has already converted."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from relume.core.color import srgb_decode, srgb_encode
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, unsupported, with_subject
 from relume.image_io.decode import MAX_SIDE, Decoder
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
 from relume.scene.model import Texture, TextureEncoding
@@ -141,7 +141,7 @@ class UsdImages:
             self._warnings.append(unsupported(f"Skipped “{name}”: {error}."))
             return None
         pixels: F32 = np.maximum(np.nan_to_num(values), 0)
-        self._warnings.extend(ImporterWarning(f"“{name}” {each}", each.severity) for each in predicates)
+        self._warnings += with_subject(f"“{name}”", predicates)
         if pixels.max() > 1:
             self._warnings.append(approximated(f"Values of “{name}” above 1 are clamped in textures."))
         return pixels

@@ -10,7 +10,8 @@ import posixpath
 from typing import Any
 from xml.etree import ElementTree
 
-from relume.core.errors import SceneError
+from relume.core.errors import MaterialError, SceneError
+from relume.scene_io.materialx.safe_xml import check_xml
 
 ROOT = "/MaterialX/Materials"
 MAX_NODES = 10_000  # of all materials
@@ -34,9 +35,10 @@ def write_materialx_layer(data: bytes, path: str) -> Any:
     if b"<!" in data.replace(b"<!--", b""):
         raise SceneError("it declares entities; remove them")
     try:
-        document = ElementTree.fromstring(data)  # noqa: S314  (without declarations, there are no entities to expand)
-    except (ElementTree.ParseError, ValueError):
-        raise SceneError("it is not valid XML; export it again") from None
+        check_xml(data)  # in any text encoding
+    except MaterialError as error:
+        raise SceneError(str(error)) from None
+    document = ElementTree.fromstring(data)  # noqa: S314  (there are no entities to expand)
     layer = Sdf.Layer.CreateNew(path)
     stage = Usd.Stage.Open(layer)
     stage.DefinePrim("/MaterialX")
