@@ -8,7 +8,12 @@ import typer
 
 
 def bench(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Run benchmarks whose name starts with this, and those measured with them.")] = "",
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="[NAME]", help="Run benchmarks whose name starts with this, and those measured with them."
+        ),
+    ] = "",
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of name, value, unit, context.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Only the accuracy figures that take seconds.")] = False,
     check: Annotated[bool, typer.Option("--check", help="Fail if a figure is past its target.")] = False,

@@ -15,6 +15,7 @@ from relume_cli.pictures.plans import Between, TurntableSubject
 from relume_cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
+    from relume.scene.model import Scene
     from relume_cli.pictures.files import ExrOptions
     from relume_cli.pictures.plans import AnimationPlan, PlannedFile
     from relume_cli.pictures.write_images import RenderSource
@@ -37,6 +38,7 @@ def render(
     light_groups: Annotated[
         bool, typer.Option("--light-groups", help="EXR: add direct and indirect layers per light.")
     ] = False,
+    aovs: Annotated[bool, typer.Option("--aovs", help="EXR: add depth, normals and others, and Cryptomattes.")] = False,
     full_float: Annotated[bool, typer.Option("--float", help="EXR: 32-bit floats instead of 16-bit.")] = False,
     color_space: Annotated[
         str | None,
@@ -83,7 +85,14 @@ def render(
 
     animation_plan = make_animation_plan(turntable, rotate, frames, between, fps)
     check_target(output, animation_plan, resumes=resume)
-    exr = exr_options(output, layers=layers, light_groups=light_groups, full_float=full_float, color_space=color_space)
+    exr = exr_options(
+        output,
+        layers=layers,
+        light_groups=light_groups,
+        aovs=aovs,
+        full_float=full_float,
+        color_space=color_space,
+    )
     service = open_bakes(open_settings(data))
     try:
         planned_files = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, animation_plan)
@@ -176,7 +185,13 @@ def _open(
         note("note: --approximate renders the image shown while the camera moves; leave it out for the exact one")
 
     @cache
-    def find_static_views() -> StaticViewBuilder:
-        return StaticViewBuilder.from_bake(transfer, load_registered_scene(service.data_dir, scene.id))
+    def load_scene() -> Scene:
+        return load_registered_scene(service.data_dir, scene.id)
 
-    return RenderSource(scene, bake_status, view_name, transfer, None if is_approximate else find_static_views)
+    @cache
+    def find_static_views() -> StaticViewBuilder:
+        return StaticViewBuilder.from_bake(transfer, load_scene())
+
+    return RenderSource(
+        scene, bake_status, view_name, transfer, load_scene, None if is_approximate else find_static_views
+    )

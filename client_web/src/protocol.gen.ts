@@ -212,7 +212,7 @@ export interface RegionMessage {
   rect: [number, number, number, number] | null;
 }
 
-/** A batch of exact images; looks may be partial. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
+/** A batch of exact images; looks may be partial. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission, and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
 export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
@@ -225,6 +225,7 @@ export interface RenderRequest {
   size?: [number, number] | null;
   name?: string | null;
   layers?: boolean | "light_groups";
+  aovs?: boolean;
   precision?: "half" | "float";
   color_space?: string | null;
   fps?: number;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -28,20 +28,32 @@ def image_channels(image: NDArray[np.floating], layer: str = "") -> Channels:
     return [(prefix + name, image[..., c]) for c, name in enumerate("RGBA"[: image.shape[2]])]
 
 
-def write_exr(path: Path, channels: Channels, attributes: Attributes, precision: Precision = "half") -> None:
+def write_exr(
+    path: Path,
+    channels: Channels,
+    attributes: Attributes,
+    precision: Precision = "half",
+    full_floats: Collection[str] = (),
+) -> None:
     """Write a file atomically.
 
     Args:
         path: the file, which is replaced.
-        channels, attributes, precision: as for `write_scanlines`.
+        channels, attributes, precision, full_floats: as for `write_scanlines`.
     Raises:
         RelumeError: the file cannot be written.
     """
     with atomic_write(path) as unfinished:
-        write_scanlines(unfinished, channels, attributes, precision)
+        write_scanlines(unfinished, channels, attributes, precision, full_floats)
 
 
-def write_scanlines(path: Path, channels: Channels, attributes: Attributes, precision: Precision) -> None:
+def write_scanlines(
+    path: Path,
+    channels: Channels,
+    attributes: Attributes,
+    precision: Precision,
+    full_floats: Collection[str] = (),
+) -> None:
     """Write one scan-line part.
 
     Args:
@@ -49,12 +61,16 @@ def write_scanlines(path: Path, channels: Channels, attributes: Attributes, prec
         channels: name, such as "R" or "light_Key.R", and values, (height, width), possibly memory-mapped.
         attributes: text, numbers, vectors, and matrices (4, 4) in OpenEXR's convention of row vectors.
         precision: float type of the values; half clamps them to 65,504.
+        full_floats: channels with 32-bit floats, whatever the precision.
     Raises:
         OSError: the file cannot be written.
     """
     height, width = channels[0][1].shape
     specification = OpenImageIO.ImageSpec(width, height, len(channels), _TYPES[precision])
     specification.channelnames = tuple(name for name, _ in channels)
+    types = ["float" if name in full_floats else precision for name, _ in channels]
+    specification.channelformats = tuple(OpenImageIO.TypeDesc(name) for name in types)
+    is_half = np.array([name == "half" for name in types])
     specification.attribute("compression", "zip")
     for name, value in attributes.items():
         _add(specification, name, value)
@@ -65,8 +81,7 @@ def write_scanlines(path: Path, channels: Channels, attributes: Attributes, prec
     for first in range(0, height, _STRIP_ROWS):
         last = min(first + _STRIP_ROWS, height)
         strip = np.stack([values[first:last] for _, values in channels], axis=-1).astype(np.float32)
-        if precision == "half":
-            np.minimum(strip, MAX_HALF, out=strip)
+        np.minimum(strip, MAX_HALF, out=strip, where=is_half)
         is_written = is_written and output.write_scanlines(first, last, 0, strip)
     if not output.close() or not is_written:
         raise OSError(output.geterror())

@@ -256,6 +256,13 @@ def test_render_writes_layers_and_rejects_formats_without_them(
     np.testing.assert_allclose(sum(red[f"{name}_direct.R"] for name in layers), red["R"], rtol=2e-3)
     assert main(["render", "quad", "--layers", "--light-groups", "--output", str(output)]) == 1
     assert "--light-groups" in capsys.readouterr().err
+    assert main(["render", "quad", "--aovs", "--output", str(output)]) == 0
+    spec = OpenImageIO.ImageBuf(str(output)).spec()
+    types = dict(zip(spec.channelnames, map(str, spec.channelformats), strict=True))
+    assert {types[name] for name in ("R", "G", "B")} == {"half"}
+    assert {types[name] for name in ("Z", "P.X", "N.Z", "albedo.G", "CryptoObject02.A")} == {"float"}
+    assert main(["render", "quad", "--aovs", "--output", str(tmp_path / "x.png")]) == 1
+    assert "--aovs" in capsys.readouterr().err
     assert main(["render", "quad", "--float", "--output", str(output)]) == 0
     assert str(OpenImageIO.ImageBuf(str(output)).spec().format) == "float"
     assert main(["render", "quad", "--layers", "--output", str(tmp_path / "x.png")]) == 1

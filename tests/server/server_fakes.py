@@ -16,6 +16,7 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.jobs import Job, Priority, ignore_result
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis
 from relume.look import default_look
+from relume.output.exr.aovs import AovTracer
 from relume.output.viewport import Viewport
 from relume.reference import ReferenceImage
 from relume.scene.model import Camera, Material, Mesh, Scene
@@ -279,6 +280,7 @@ class Control:
         openers_and_renderers = self._open, self._open, self._picture, self._render, self._render_small, self._reference
         return Library(
             *openers_and_renderers,
+            lambda transfer, look: AovTracer.from_look(tiny_scene(), look),
             lambda folder: Viewport.from_scene(load_scene(folder)),
             lambda transfer: ({}, {}),
             lambda: {CacheOwner("linear operator", "0123"): 100},

@@ -58,3 +58,14 @@ def test_exr_render_has_layers_progress_and_cancellation(
     names = {name.partition(".")[0] for name in OpenImageIO.ImageBuf(str(tmp_path / "a.exr")).spec().channelnames}
     assert names == {"R", "G", "B", *(f"light_{light}_direct" for light in ("environment", "Key", "key_2"))}
     assert len(list((client.app.state.services.settings.data / "renders").iterdir())) == 2
+
+
+def test_exr_render_has_aovs_of_its_size(client: TestClient, baked: Baked, tmp_path: Path) -> None:
+    request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr", "size": [32, 16], "aovs": True}
+    assert client.post("/api/renders", json=request | {"format": "png"}).status_code == 422
+    url = client.post("/api/renders", json=request).headers["location"]
+    assert wait_until(client, url, is_done)["state"] == "ready"
+    (tmp_path / "a.exr").write_bytes(client.get(f"{url}/frames/0").content)
+    image = OpenImageIO.ImageBuf(str(tmp_path / "a.exr"))
+    assert (image.spec().width, image.spec().height) == (32, 16)
+    assert {"R", "Z", "N.X", "albedo.R", "CryptoMaterial00.R"} <= set(image.spec().channelnames)

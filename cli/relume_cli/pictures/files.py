@@ -16,23 +16,24 @@ FORMATS = (".exr", ".png", ".webp")
 
 
 class ExrOptions(NamedTuple):
-    """Options for EXR only: layers (`relume.output.exr.layers`), precision, and linear color space."""
+    """Options for EXR only: layers (`relume.output.exr.layers`), AOVs, precision, and linear color space."""
 
     layering: Layering = False
+    aovs: bool = False
     precision: Literal["half", "float"] = "half"
     color_space: str | None = None
 
 
 def exr_options(
-    output: Path, *, layers: bool, light_groups: bool, full_float: bool, color_space: str | None
+    output: Path, *, layers: bool, light_groups: bool, aovs: bool, full_float: bool, color_space: str | None
 ) -> ExrOptions:
     """Collect the EXR options. Raises ParameterError for other formats, and for options that exclude each other."""
     if layers and light_groups:
         raise PlanError("--layers and --light-groups exclude each other; give one")
-    if (layers or light_groups or full_float or color_space) and output.suffix.lower() != ".exr":
-        allowed = "a file name that ends in .exr, for --layers, --light-groups, --float, --color-space"
+    if (layers or light_groups or aovs or full_float or color_space) and output.suffix.lower() != ".exr":
+        allowed = "a file name that ends in .exr, for --layers, --light-groups, --aovs, --float, --color-space"
         raise ParameterError("--output", str(output), allowed)
-    return ExrOptions("light_groups" if light_groups else layers, "float" if full_float else "half", color_space)
+    return ExrOptions("light_groups" if light_groups else layers, aovs, "float" if full_float else "half", color_space)
 
 
 def check_output(path: Path) -> None:

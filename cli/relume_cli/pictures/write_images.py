@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from relume.live.fixed_camera.protocols import OpenBake
     from relume.live.opened.static_view import StaticViewBuilder
     from relume.look import Look
-    from relume.scene.model import Camera
+    from relume.scene.model import Camera, Scene
     from relume_cli.pictures.files import ExrOptions
     from relume_cli.pictures.plans import AnimationPlan, PlannedFile
     from relume_server.schemas.renders import Animation
@@ -26,12 +26,15 @@ if TYPE_CHECKING:
 
 
 class RenderSource(NamedTuple):
-    """A bake of a scene, opened, one of its views, and what makes the builder of static views; None to have none."""
+    """A bake of a scene, opened, one of its views, and functions that load the scene, and the builder of static views;
+    None to have none.
+    """
 
     scene: SceneRecord
     bake: BakeStatus
     view: str
     transfer: OpenBake
+    load_scene: Callable[[], Scene]
     find_static_views: Callable[[], StaticViewBuilder] | None
 
     def static_views(self, look: Look) -> StaticViewBuilder | None:
@@ -65,8 +68,9 @@ def write_picture(
 
 def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, report: Callable[[float], None]) -> None:
     from relume.live.fixed_camera.protocols import EditAxis
+    from relume.output.exr.aovs import AovTracer
     from relume.output.exr.color_space import find_space
-    from relume.output.exr.export import export_exr
+    from relume.output.exr.export import AovPass, export_exr
     from relume.output.exr.layers import make_layers
     from relume.output.exr.metadata import Provenance, build_attributes
     from relume.output.render_image import render_image
@@ -74,6 +78,8 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
     view = source.transfer.views[source.view]
     layers = make_layers(exr.layering, look, has_indirect=EditAxis.BOUNCES in source.transfer.axes)
     space = find_space(exr.color_space)
+    size = view.width, view.height
+    aovs = AovPass(AovTracer.from_look(source.load_scene(), look), view.camera, size) if exr.aovs else None
     origin = Provenance(source.scene.id, source.scene.name, source.bake.id)
     export_exr(
         path,
@@ -86,10 +92,11 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
         ),
         look,
         layers,
-        build_attributes(origin, view.camera, (view.width, view.height), look, layers, space),
+        build_attributes(origin, view.camera, size, look, layers, space),
         exr.precision,
         report,
         space,
+        aovs,
     )
 
 

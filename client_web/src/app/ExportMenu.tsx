@@ -31,14 +31,19 @@ const IMAGE_EXPORTS: ExportOption[] = [
   {
     label: "EXR with layers",
     help: "Beauty plus one layer per light and per light path",
-    run: () => exportExr(true),
+    run: () => exportExr({ layers: true }),
   },
   {
     label: "EXR with light groups",
     help: "Direct and indirect light of each light; they add up to the beauty layer",
-    run: () => exportExr("light_groups"),
+    run: () => exportExr({ layers: "light_groups" }),
   },
-  { label: "EXR, beauty only", help: "Faster, smaller", run: () => exportExr(false) },
+  {
+    label: "EXR with AOVs",
+    help: "Depth, position, normals, UV, albedo, emission, and Cryptomattes of objects and materials",
+    run: () => exportExr({ aovs: true }),
+  },
+  { label: "EXR, beauty only", help: "Faster, smaller", run: () => exportExr({}) },
 ];
 
 const TURNTABLE_EXPORTS: ExportOption[] = [
@@ -127,7 +132,7 @@ export function ExportMenu() {
         <button
           title={`Export the linear radiance of ${exportTargetLabel()}${availableExrSpace.value === null ? "" : ` in ${availableExrSpace.value}`}, with one layer per light${lightFilterText()}`}
           disabled={busy}
-          onClick={() => void exportExr(true)}
+          onClick={() => void exportExr({ layers: true })}
         >
           EXR
         </button>

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 
 from relume.image_io.exr_writer import MAX_HALF, Attributes, Precision, image_channels, write_exr
 from relume.look import Look
+from relume.output.exr.aovs import AovTracer
 from relume.output.exr.color_space import REC_709_SPACE, ExportColorSpace
 from relume.output.exr.layers import Layer
+from relume.scene.model import Camera
 
 Progress = Callable[[float], None]
 Render = Callable[[Look, Progress], NDArray[np.float32]]
@@ -28,6 +31,7 @@ def export_exr(
     precision: Precision = "half",
     progress: Progress = lambda share: None,
     space: ExportColorSpace = REC_709_SPACE,
+    aovs: AovPass | None = None,
 ) -> None:
     """Render a look and its layers sequentially, and write them; no more than one image is in memory.
 
@@ -38,22 +42,55 @@ def export_exr(
         attributes: attributes of the file, from `build_attributes`.
         precision: float type of the values.
         progress: called with the finished fraction, in [0, 1].
-        space: color space of the values, as in `attributes`.
+        space: color space of the values, as in `attributes`. AOVs are in it too, apart from geometry and ids.
+        aovs: AOVs of the image, with 32-bit floats; None for none.
     Raises:
         RelumeError: the file cannot be written. Errors of `render` propagate; then there is no file.
     """
     renders = [("", look), *((layer.name, layer.look) for layer in layers)]
+    num_passes = len(renders) + (aovs is not None)
     with tempfile.TemporaryDirectory(prefix=".layers-", dir=path.parent) as folder:
         channels: list[tuple[str, NDArray[np.floating]]] = []
         for k, (name, layer_look) in enumerate(renders):
 
             def report_progress(fraction: float, k: int = k) -> None:
-                progress((k + fraction) / len(renders))
+                progress((k + fraction) / num_passes)
 
             image = space.convert_image(render(layer_look, report_progress))
             image = image[..., :3] if name else image  # only the image itself has alpha
             channels += image_channels(_save_as_memmap(Path(folder) / f"{k}.npy", image, precision), name)
-        write_exr(path, channels, attributes, precision)
+        if aovs is None:
+            write_exr(path, channels, attributes, precision)
+            return
+        aov_channels = aovs.trace(Path(folder), space)
+        progress(1.0)
+        attributes = {**attributes, **aovs.tracer.attributes}
+        write_exr(path, [*channels, *aov_channels.items()], attributes, precision, aov_channels)
+
+
+@dataclass(frozen=True)
+class AovPass:
+    """AOVs of one image: what traces them, its camera, and its width and height in pixels."""
+
+    tracer: AovTracer
+    camera: Camera
+    size: tuple[int, int]
+
+    def trace(self, folder: Path, space: ExportColorSpace) -> dict[str, NDArray[np.float32]]:
+        """Trace the channels into files, which are memory-mapped; by name, (height, width)."""
+        channels = dict[str, NDArray[np.float32]]()
+        for rows, band in self.tracer.bands(self.camera, self.size):
+            for layer in ("albedo", "emission"):
+                names = [f"{layer}.{channel}" for channel in "RGB"]
+                converted = space.convert_image(np.stack([band[name] for name in names], axis=-1))
+                band |= {name: converted[..., channel] for channel, name in enumerate(names)}
+            for number, (name, values) in enumerate(band.items()):
+                if name not in channels:
+                    channels[name] = np.lib.format.open_memmap(
+                        folder / f"aov-{number}.npy", "w+", np.float32, self.size[::-1]
+                    )
+                channels[name][rows] = values
+        return channels
 
 
 def _save_as_memmap(path: Path, image: NDArray[np.float32], precision: Precision) -> NDArray[np.floating]:

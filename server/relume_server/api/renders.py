@@ -165,6 +165,8 @@ def _check(request: RenderRequest, transfer: OpenBake) -> int:
     view = baked_view(request.view, transfer)
     if request.format != "exr" and request.layers:
         raise ParameterError("layers", True, "false, because only EXR files have layers")
+    if request.format != "exr" and request.aovs:
+        raise ParameterError("aovs", True, "false, because only EXR files have AOVs")
     if request.format != "exr" and request.color_space is not None:
         raise ParameterError("color_space", request.color_space, "null, because only EXR files have a color space")
     find_space(request.color_space)

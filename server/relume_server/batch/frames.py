@@ -11,9 +11,9 @@ from relume.core.filesystem import atomic_write
 from relume.image_io.downsample import downsample
 from relume.image_io.write_image import write_image
 from relume.live.fixed_camera.jobs import CancelCheck
-from relume.live.fixed_camera.protocols import EditAxis, OpenBake
+from relume.live.fixed_camera.protocols import EditAxis
 from relume.output.exr.color_space import find_space
-from relume.output.exr.export import Progress, export_exr
+from relume.output.exr.export import AovPass, Progress, export_exr
 from relume.output.exr.layers import make_layers
 from relume.output.exr.metadata import Provenance, build_attributes
 from relume_server.batch.context import BatchContext
@@ -63,7 +63,7 @@ def paint_frame(
 
     look = look_at_frame(render_request, render_request.view, transfer, index)
     if render_request.format == "exr":
-        _export(target, render, look, transfer, render_request, camera or view.camera, scene_name, report)
+        _export(target, render, look, context, render_request, camera or view.camera, scene_name, report)
     else:
         write_image(target, render(look, report), look.display.exposure, look.display.tone_map)
     return {}
@@ -73,19 +73,21 @@ def _export(
     path: Path,
     render: Any,
     look: Any,
-    transfer: OpenBake,
+    context: BatchContext,
     request: RenderRequest,
     camera: Camera,
     scene_name: str,
     progress: Progress,
 ) -> None:
+    transfer = context.transfer(request.bake)
     view = transfer.views[request.view]
     layers = make_layers(request.layers, look, has_indirect=EditAxis.BOUNCES in transfer.axes)
     origin = Provenance(transfer.scene_id, scene_name, request.bake)
     size = request.size or (view.width, view.height)
     space = find_space(request.color_space)
     attributes = build_attributes(origin, camera, size, look, layers, space)
-    export_exr(path, render, look, layers, attributes, request.precision, progress, space)
+    aovs = AovPass(context.library.aov_tracer(transfer, look), camera, size) if request.aovs else None
+    export_exr(path, render, look, layers, attributes, request.precision, progress, space, aovs)
 
 
 def pack(

@@ -15,6 +15,8 @@ from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
 from relume_worker.jobs.job_service import JobService
 
+_AOV_BYTES = 4 * 39  # of a pixel: 32-bit floats
+
 RenderJob = Job[RenderRequest]
 HEAD_BYTES = 1 << 16
 """Upper bound of an image file's size without pixels."""
@@ -128,7 +130,8 @@ def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int
         request: the batch. size: size of an image, pixels. num_layers: per image, including the image itself.
     """
     channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
-    picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers
+    aov_bytes = _AOV_BYTES * request.aovs
+    picture_bytes = size[0] * size[1] * (3 * channel_bytes * num_layers + aov_bytes)
     return 2 * request.num_frames * (picture_bytes + HEAD_BYTES)
 
 

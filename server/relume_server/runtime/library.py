@@ -10,7 +10,7 @@ from relume_worker.paths import scene_path_of_bake
 from relume_worker.storage import fetch_if_missing, open_cached
 
 if TYPE_CHECKING:
-    from relume.scene.model import Camera
+    from relume.scene.model import Camera, Scene
 
 
 def open_library(cache_bytes: int, floor_bytes: int) -> Library:
@@ -29,6 +29,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.live.free_camera.progressive_picture import ProgressivePicture
     from relume.live.opened.openers import open_bake
     from relume.live.opened.static_view import StaticViewBuilder
+    from relume.output.exr.aovs import AovTracer
     from relume.output.render_image import needs_tracing, render_image, render_small
     from relume.output.viewport import Viewport
     from relume.reference import render_reference
@@ -45,11 +46,12 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
             (str(scene), "finder"), lambda: Viewport.from_scene(load_scene(fetch_if_missing(scene)))
         )
 
+    def scene_of(transfer: Any) -> Scene:
+        return load_scene(fetch_if_missing(scene_path_of_bake(Path(transfer.key), transfer.scene_id)))
+
     def static_view_builder(transfer: Any) -> StaticViewBuilder:
-        scene = scene_path_of_bake(Path(transfer.key), transfer.scene_id)
         return memory.transient.get_value(
-            (transfer.key, "scene"),
-            lambda: StaticViewBuilder.from_bake(transfer, load_scene(fetch_if_missing(scene))),
+            (transfer.key, "scene"), lambda: StaticViewBuilder.from_bake(transfer, scene_of(transfer))
         )
 
     def make_picture(transfer: Any, view: str) -> Any:
@@ -75,6 +77,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         open_transient=lambda path: open_cached(path, lambda store: open_bake(store, memory.transient)),
         make_picture=make_picture,
         render=render,
+        aov_tracer=lambda transfer, look: AovTracer.from_look(scene_of(transfer), look),
         render_small=render_small,
         reference=reference,
         open_viewport=open_viewport,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
     from relume.live.fixed_camera.picture import Progress
     from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
+    from relume.output.exr.aovs import AovTracer
     from relume.reference import ReferenceImage
     from relume.scene.model import Camera
 
@@ -95,6 +96,7 @@ class Library:
             columns if the bake has them.
         reference: (folder of a scene, camera, complete look, size, spp, progress, canceled, pass index, reflects=has
             indirect light, is_whole=all light paths requested) -> `relume.reference.ReferenceImage`; heavy.
+        aov_tracer: (transfer, complete look) -> `relume.output.exr.aovs.AovTracer`; heavy.
         open_viewport: folder of a scene -> preview for placing cameras; heavy unless used recently.
         shader_arrays: free-camera transfer -> constants of its shaders, and their arrays.
         bytes_by_owner: memory of all results computed from bakes: kind and bake -> bytes.
@@ -108,6 +110,7 @@ class Library:
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
     reference: Callable[..., ReferenceImage]
+    aov_tracer: Callable[[Any, Any], AovTracer]
     open_viewport: Callable[[Path], PlacementViewport]
     shader_arrays: Callable[[Any], tuple[Mapping[str, Any], Mapping[str, Callable[[], NDArray[Any]]]]]
     bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]

@@ -116,8 +116,9 @@ class RenderRequest(Animation):
 
     `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view.
     Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light
-    of each light, which add up to the image; `precision` of the values; and `color_space`, a linear one of the server's
-    OpenColorIO config (GET /api/color), by default linear Rec. 709.
+    of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission,
+    and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the
+    server's OpenColorIO config (GET /api/color), by default linear Rec. 709.
 
     For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per
     second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster.
@@ -128,6 +129,7 @@ class RenderRequest(Animation):
     size: tuple[Side, Side] | None = None
     name: Name | None = None
     layers: Layering = False
+    aovs: bool = False
     precision: Literal["half", "float"] = "half"
     color_space: Name | None = None
     fps: Annotated[int, Field(ge=1, le=120)] = 25

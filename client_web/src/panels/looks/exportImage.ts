@@ -75,19 +75,23 @@ export async function startExport(
   await renderAndSave(exportName, fetchFrom, request, lightFilterText());
 }
 
-const KINDS = new Map<boolean | "light_groups", string>([
-  [false, "flat"],
-  ["light_groups", "light groups"],
-]);
+/** What an EXR has beside the image: `layers` per light and per light path, or of direct and indirect light per light;
+ * `aovs`. */
+type ExrContents = Pick<RenderRequest, "layers" | "aovs">;
 
-/** Export an EXR: flat, with one layer per light and per light path, or with direct and indirect light per light. */
-export function exportExr(layers: boolean | "light_groups"): Promise<void> {
+function exrKind({ layers, aovs }: ExrContents): string {
+  if (aovs) return "AOVs";
+  return layers === "light_groups" ? "light groups" : layers ? "" : "flat";
+}
+
+/** Export an EXR. */
+export function exportExr(contents: ExrContents): Promise<void> {
   const pose = currentPose();
   return startExport("EXR", "frames/0", {
     format: "exr",
-    layers,
+    ...contents,
     color_space: availableExrSpace.value,
-    name: fileStem(KINDS.get(layers), availableExrSpace.value ?? ""),
+    name: fileStem(exrKind(contents), availableExrSpace.value ?? ""),
     path: pose === null ? null : { cameras: [pose] },
   });
 }
