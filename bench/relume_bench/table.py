@@ -57,6 +57,7 @@ TARGETS = {
     "bake.two_workers_speedup": "≥ 1.8",
     "render.two_workers_speedup": "≥ 1.7",
     "store.bytes_per_view_sample": "≤ 600",
+    "export.cryptomatte_error": "≤ 0.0039",
     "assets.rmse_median": "≤ 4 %",
     "assets.rmse_p90": "≤ 12 %",
     "assets.flip_median": "≤ 0.03",

@@ -25,7 +25,7 @@ IN_PROCESS = [
     "rays", "bake", "store_size", "paper_fig5", "accuracy_terms", "accuracy_generated", "pca",
     "preview", "curve_switch_terms", "shade",
     "estimators", "sharp_slider", "mesh_files",
-    "factorization", "factorization_measured", "factorization_pictures", "large",
+    "factorization", "factorization_measured", "factorization_pictures", "large", "cryptomatte_file",
 ]  # fmt: skip
 LONG = [
     "workers", "plan", "session", "demo", "canvas", "peer_mitsuba", "reference",
