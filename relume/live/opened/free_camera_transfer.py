@@ -256,7 +256,7 @@ class BakedFreeCamera:
             vectors += self._preview_environment(lights, probes, probe_indices)
         if element.paths.has_indirect:
             solution = self.light_transport.indirect_at_probes.solve_indirect(element, LightQuality.PREVIEW)
-            vectors += self._ray_vectors(solution.along_rays(), probe_indices)
+            vectors += self._ray_vectors(solution.along_rays(is_smoothed=False), probe_indices)
         return vectors
 
     def indirect_delta(
@@ -268,7 +268,7 @@ class BakedFreeCamera:
             before, after: lights of the same sources. probe_indices: the probes.
         """
         change = self.light_transport.indirect_at_probes.solve_indirect(after, LightQuality.EXACT, start_from=before)
-        return self._ray_vectors(change.along_rays(), probe_indices)
+        return self._ray_vectors(change.along_rays(is_smoothed=False), probe_indices)
 
     def _ray_vectors(self, outgoing: OutgoingLight, probe_indices: NDArray[np.intp]) -> F32:
         return shared_direction_coefficients(

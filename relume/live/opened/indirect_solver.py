@@ -37,9 +37,9 @@ class IndirectSolution(NamedTuple):
     outgoing: OutgoingRadiance
     virtual_lights: VirtualLights | None = None
 
-    def along_rays(self) -> OutgoingLight:
-        """Tabulate the radiance for lookups along gather rays."""
-        return self.outgoing.outgoing_light(self.patches)
+    def along_rays(self, *, is_smoothed: bool = True) -> OutgoingLight:
+        """Tabulate the radiance for lookups along rays. is_smoothed: see `OutgoingRadiance.outgoing_light`"""
+        return self.outgoing.outgoing_light(self.patches, is_smoothed=is_smoothed)
 
     def mean_to_others(self) -> Shaped[F32, "patches 3"]:
         """Return the mean radiance of each patch toward other patches."""
