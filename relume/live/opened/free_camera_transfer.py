@@ -369,6 +369,11 @@ class BakedFreeCamera:
         return ray_pattern(self.light_transport.store, self._gather_hits.shape[1])
 
     @property
+    def num_patches(self) -> int:
+        """Number of patches with indirect light."""
+        return self.light_transport.patches.num_patches
+
+    @property
     def vectors_shape(self) -> tuple[int, int, int]:
         """Shape of `vectors`: probes, channels, K."""
         return self.stored_scene.probes.num_points, 3, NUM_FUNCTIONS
