@@ -255,7 +255,9 @@ class BakedFreeCamera:
         if lights.num_lights:
             vectors += self._preview_environment(lights, probes, probe_indices)
         if element.paths.has_indirect:
-            solution = self.light_transport.indirect_at_probes.solve_indirect(element, LightQuality.PREVIEW)
+            solution = self.light_transport.indirect_at_probes.solve_indirect(
+                element, LightQuality.PREVIEW, is_for_rays=True
+            )
             vectors += self._ray_vectors(solution.along_rays(is_smoothed=False), probe_indices)
         return vectors
 
