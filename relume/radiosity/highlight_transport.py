@@ -3,8 +3,8 @@
     L(c, s) = Σ_k g_k(c) Σ_b E_b(c) T_k(b, s),   E_b(c) = Σ_l V_l E_l cos θ_l   over the lights l in bin b
 
 T are the tables of the highlights k of its material (`relume.brdf.highlight_tables`) and g their colors and textures.
-All points of a patch contribute, in previews only one to local lights. If their normals differ, a light is binned in the direction from which the patch
-normal reflects it as the point's normal does.
+All points of a patch contribute, in previews only one to local lights. If their normals differ, a light is binned in
+the direction from which the patch normal reflects it as the point's normal does.
 """
 
 from __future__ import annotations

@@ -198,7 +198,9 @@ class IndirectSolver:
             light, reflectance_operator, is_preview=not approximation.has_exact_lights
         )
         outgoing_highlights = (
-            _outgoing_highlights(light, reflectance_operator, direct_light, is_preview=not approximation.has_exact_lights)
+            _outgoing_highlights(
+                light, reflectance_operator, direct_light, is_preview=not approximation.has_exact_lights
+            )
             if approximation.has_sharp_highlights
             else None
         )

@@ -150,9 +150,7 @@ class DirectPatchLight:
             )
         return incident
 
-    def direct(
-        self, light: Illumination, rows: Shaped[NDArray[np.intp], " G"], *, is_preview: bool
-    ) -> DirectLobes:
+    def direct(self, light: Illumination, rows: Shaped[NDArray[np.intp], " G"], *, is_preview: bool) -> DirectLobes:
         """Return the direct light at the sample points of patches `rows`, per source.
 
         Args:
