@@ -92,16 +92,16 @@ def radiance_from_patch(
     """
     lobe = np.full(NO_PATCH + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
-    variants = coefficients[None]
+    degrees = DEGREES[:NUM_OUTGOING] * (DEGREES[:NUM_OUTGOING] + 2)
+    variants = [coefficients]
     if decay is not None:
-        degrees = DEGREES[:NUM_OUTGOING] * (DEGREES[:NUM_OUTGOING] + 2)
-        variants = np.stack([coefficients, coefficients * np.exp(-np.outer(decay, degrees))[:, None]])
+        variants.append((coefficients * np.exp(-np.outer(decay, degrees))[:, None]).astype(np.float32))
     extra_rows, extra_radiance = extra_bins or _NO_EXTRA_BINS
     extra_row = np.full(len(rows), -1, np.int32)
     extra_row[extra_rows] = np.arange(len(extra_rows))
     scale = np.empty((len(rows), 3), np.float32)
     tables = np.empty((len(variants), len(rows), SIDE * SIDE, 3), np.int16)
-    basis = np.ascontiguousarray(variants, np.float32), bin_means()
+    basis = np.stack(variants).astype(np.float32), bin_means()
     args = *basis, isotropic_radiance[rows], extra_row, extra_radiance, _bin_areas(), is_positive
     parallel_for_chunks(lambda start, stop: _tabulate(*args, start, stop, scale, tables), len(rows))
     return OutgoingLight(isotropic_radiance, lobe, frame, scale, tables[0], tables[-1])
