@@ -197,7 +197,9 @@ def gather_incident_light(transfer, view: View, index, look):
         patch_lobes = transfer.patches.highlight_tables(light.reflectances, reflecting)
         lobe_light = (
             patch_lobes,
-            outgoing_in_highlights(transfer.patches, patch_lobes, patch_light.direct(scaled_light, patch_lobes.rows)),
+            outgoing_in_highlights(
+                transfer.patches, patch_lobes, patch_light.direct(scaled_light, patch_lobes.rows, is_preview=False)
+            ),
         )
         bounces = light.paths.first, light.paths.last
         indirect = solve_bounces(transfer.patches, reflecting, incident, *bounces, lobe_light).outgoing_light(

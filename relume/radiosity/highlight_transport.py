@@ -3,8 +3,8 @@
     L(c, s) = Σ_k g_k(c) Σ_b E_b(c) T_k(b, s),   E_b(c) = Σ_l V_l E_l cos θ_l   over the lights l in bin b
 
 T are the tables of the highlights k of its material (`relume.brdf.highlight_tables`) and g their colors and textures.
-All points of a patch contribute. If their normals differ, a light is binned in the direction from which the patch
-normal reflects it as the point's normal does.
+All points of a patch contribute, in previews only one to local lights. If their normals differ, a light is binned in
+the direction from which the patch normal reflects it as the point's normal does.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from relume.math.direction_grid import (
 )
 from relume.radiosity.highlight_tables import HighlightTables
 from relume.radiosity.patch_irradiance import PatchLight
+from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.shading_points import RayList, ShadingPoints, build_ray_lists
 
 F32 = NDArray[np.float32]
@@ -42,12 +43,14 @@ class DirectLobes(NamedTuple):
 
     Attributes:
         lights: triangles of the environment. visible: these lights from the sample points.
-        rays: rays of the same points, from local lights.
+        rays: rays from local lights.
+        ray_points: points of the rays, patch by patch, the same number of each; None: all sample points.
     """
 
     lights: TriangleLights | None = None
     visible: Shaped[NDArray[np.uint8], "G points bytes"] | None = None
     rays: Sequence[RayList] = ()
+    ray_points: SurfacePoints | None = None
 
 
 def outgoing_in_highlights(
@@ -61,8 +64,9 @@ def outgoing_in_highlights(
     out = np.zeros((len(highlights.rows), 3, NUM_DIRECTION_BINS), np.float32)
     points = patches.points_of(highlights.rows)
     frames, points_per_patch = patches.frames[highlights.rows], patches.points_per_patch
-    no_visibility = np.empty((points.num_points, 0), np.uint8)
-    receivers = ShadingPoints(points, points.normal, no_visibility)
+    ray_points = points if direct_lobes.ray_points is None else direct_lobes.ray_points
+    ray_points_per_patch = ray_points.num_points // max(1, len(frames))
+    receivers = ShadingPoints(ray_points, ray_points.normal, np.empty((ray_points.num_points, 0), np.uint8))
 
     def fill(start: int, stop: int) -> None:
         bins = np.zeros((stop - start, NUM_REFLECTIONS, NUM_FINE_BINS, 3), np.float32)
@@ -76,9 +80,10 @@ def outgoing_in_highlights(
                 direct_lobes.lights.irradiance,
             )
             _add_triangles(frames[start:stop], normals, *light_arrays, bins)
-        range_points = points.rows(slice(points_per_patch * start, points_per_patch * stop))
+        ray_range = ray_points_per_patch * start, ray_points_per_patch * stop
+        range_points = ray_points.rows(slice(*ray_range))
         for rays in direct_lobes.rays:
-            ray_list = build_ray_lists(rays, receivers, points_per_patch * start, points_per_patch * stop)
+            ray_list = build_ray_lists(rays, receivers, *ray_range)
             _add_ray_list(frames[start:stop], range_points, ray_list.first, ray_list.wi, ray_list.irradiance, bins)
         highlight_arrays = highlights.table_index[start:stop], highlights.gain[start:stop]
         _spread(bins, *highlight_arrays, highlights.tables, reflected_bins(), out[start:stop])

@@ -60,14 +60,21 @@ class OutgoingRadiance(NamedTuple):
     bins: BinnedRadiance = EMPTY_BINS
     is_change: bool = False
 
-    def outgoing_light(self, patches: PatchLight, *, to_narrow_lobes: bool = True) -> OutgoingLight:
-        """Tabulate for lookups by rays. to_narrow_lobes: for view samples rather than patches"""
-        decay = decay_of(self.roughening) if to_narrow_lobes else None
+    def outgoing_light(
+        self, patches: PatchLight, *, is_smoothed: bool = True, is_positive: bool = True
+    ) -> OutgoingLight:
+        """Tabulate for lookups by rays.
+
+        Args:
+            patches: the patches. is_smoothed: with a smoothed table, which narrow lobes need.
+            is_positive: nowhere negative, except for a change; light that only patches gather may ring.
+        """
+        decay = decay_of(self.roughening) if is_smoothed else None
         bin_rows = np.searchsorted(self.rows, self.bins.rows)
         frames = patches.frames[self.rows]
         return radiance_from_patch(
             pad(self.isotropic), self.rows, frames, self.coefficients, decay, (bin_rows, self.bins.radiance),
-            is_positive=to_narrow_lobes and not self.is_change,
+            is_positive=is_positive and not self.is_change,
         )  # fmt: skip
 
     def mean_to_others(self, patches: PatchLight) -> Shaped[F32, "patches 3"]:

@@ -92,7 +92,7 @@ def _reflect(
     patches: PatchLight, reflectance_operator: ReflectanceOperator, outgoing: OutgoingRadiance, directions: Directions
 ) -> OutgoingRadiance:
     """Return the light of one further bounce."""
-    light = outgoing.outgoing_light(patches, to_narrow_lobes=False)
+    light = outgoing.outgoing_light(patches, is_smoothed=False, is_positive=False)
     incident = patches.incident_light(light, outgoing.rows, is_binned=directions is Directions.BINNED)
     return first_bounce(reflectance_operator, incident)
 

@@ -23,7 +23,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
-from relume.core.thread_pools import for_ranges
+from relume.core.thread_pools import parallel_for_chunks
 from relume.math.direction_grid import SIDE, bin_solid_angles, offsets_in_bin
 from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, num_functions
 from relume.patches.patch_kdtree import NO_PATCH
@@ -35,7 +35,7 @@ NUM_OUTGOING = num_functions(OUTGOING_DEGREE)
 
 _NARROWEST = 1 / (2 * 4.9**2)  # of highlight and window together: a metal of roughness 0.3
 _STEPS = 32_767  # of 16-bit radiance
-_ROWS_PER_RANGE = 256  # their values stay in the cache
+_NO_EXTRA_BINS = np.empty(0, np.intp), np.empty((0, 3, SIDE * SIDE), np.float32)
 
 
 class OutgoingLight(NamedTuple):
@@ -92,35 +92,72 @@ def radiance_from_patch(
     """
     lobe = np.full(NO_PATCH + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
+    degrees = DEGREES[:NUM_OUTGOING] * (DEGREES[:NUM_OUTGOING] + 2)
+    variants = [coefficients]
+    if decay is not None:
+        variants.append((coefficients * np.exp(-np.outer(decay, degrees))[:, None]).astype(np.float32))
+    extra_rows, extra_radiance = extra_bins or _NO_EXTRA_BINS
+    extra_row = np.full(len(rows), -1, np.int32)
+    extra_row[extra_rows] = np.arange(len(extra_rows))
     scale = np.empty((len(rows), 3), np.float32)
-    means, degrees = bin_means(), DEGREES[:NUM_OUTGOING] * (DEGREES[:NUM_OUTGOING] + 2)
-    tables = np.empty((1 if decay is None else 2, len(rows), SIDE * SIDE, 3), np.int16)
-
-    def fill(start: int, stop: int) -> None:
-        block = coefficients[start:stop]
-        variants = [block] if decay is None else [block, block * np.exp(-np.outer(decay[start:stop], degrees))[:, None]]
-        values = np.stack(variants).astype(np.float32) @ means  # (tables, patches, 3, bins)
-        if extra_bins is not None:
-            selection = slice(*np.searchsorted(extra_bins[0], [start, stop]))
-            values[:, extra_bins[0][selection] - start] += extra_bins[1][selection]
-        if is_positive:
-            even = isotropic_radiance[rows[start:stop], :, None]
-            values = _without_negative(values + even) - even
-        largest = np.maximum(values.max(axis=(0, 3)), -values.min(axis=(0, 3)))
-        scale[start:stop] = np.maximum(largest, np.float32(1e-30)) / np.float32(_STEPS)
-        values /= scale[start:stop, :, None]
-        np.rint(values, out=values)
-        tables[:, start:stop] = values.transpose(0, 1, 3, 2)
-
-    for_ranges(fill, len(rows), _ROWS_PER_RANGE)
+    tables = np.empty((len(variants), len(rows), SIDE * SIDE, 3), np.int16)
+    basis = np.stack(variants).astype(np.float32), bin_means()
+    args = *basis, isotropic_radiance[rows], extra_row, extra_radiance, _bin_areas(), is_positive
+    parallel_for_chunks(lambda start, stop: _tabulate(*args, start, stop, scale, tables), len(rows))
     return OutgoingLight(isotropic_radiance, lobe, frame, scale, tables[0], tables[-1])
 
 
-def _without_negative(radiance: Shaped[F32, "*shape bins"]) -> Shaped[F32, "*shape bins"]:
-    """Clip radiance at zero, and scale the rest to its flux ∫ L cos θ dω; black without any."""
-    areas, clipped = bin_solid_angles().astype(np.float32), np.maximum(radiance, 0)
-    flux, clipped_flux = np.maximum(radiance @ areas, 0), np.maximum(clipped @ areas, np.float32(1e-30))
-    return np.asarray(clipped * (flux / clipped_flux)[..., None], np.float32)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _tabulate(  # type: ignore[no-untyped-def]
+    coefficients, means, even, extra_row, extra, areas, is_positive, start, stop, scale, tables
+):
+    """Tabulate the patches [start, stop).
+
+    Args:
+        coefficients: L_j for each table. (tables, G, 3, J). means: `bin_means`. even: isotropic radiance. (G, 3)
+        extra_row: row of each patch in `extra`, −1 for none. (G,). extra: additional radiance. (F, 3, bins)
+        areas: `bin_solid_angles`, float32. is_positive: see `radiance_from_patch`.
+        scale, tables: written; see `OutgoingLight`. (G, 3), (tables, G, bins, 3)
+    """
+    values = np.empty((coefficients.shape[0], means.shape[1]), np.float32)
+    for g in range(start, stop):
+        for channel in range(3):
+            largest = np.float32(1e-30)
+            for t in range(values.shape[0]):
+                value = values[t]
+                value[:] = 0
+                for j in range(means.shape[0]):
+                    coefficient = coefficients[t, g, channel, j]
+                    for b in range(means.shape[1]):
+                        value[b] += coefficient * means[j, b]
+                if extra_row[g] >= 0:
+                    value += extra[extra_row[g], channel]
+                if is_positive:
+                    _clip_negative(value, even[g, channel], areas)
+                for b in range(means.shape[1]):
+                    largest = max(largest, abs(value[b]))
+            scale[g, channel] = largest / np.float32(_STEPS)
+            steps = np.float32(_STEPS) / largest
+            for t in range(values.shape[0]):
+                for b in range(means.shape[1]):
+                    tables[t, g, b, channel] = np.int16(np.rint(steps * values[t, b]))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True)
+def _clip_negative(value, even, areas):  # type: ignore[no-untyped-def]
+    """Clip the radiance of a patch at zero, and scale the rest to its flux ∫ L cos θ dω; black without any.
+
+    Args:
+        value: its directional part, overwritten. (bins,). even: its isotropic part. areas: of the bins. (bins,)
+    """
+    flux, clipped_flux = np.float32(0), np.float32(1e-30)
+    for b in range(value.shape[0]):
+        radiance = value[b] + even
+        flux += areas[b] * radiance
+        clipped_flux += areas[b] * max(radiance, np.float32(0))
+    gain = max(flux, np.float32(0)) / clipped_flux
+    for b in range(value.shape[0]):
+        value[b] = gain * max(value[b] + even, np.float32(0)) - even
 
 
 def decay_of(roughening: Shaped[F32, " G"]) -> Shaped[F32, " G"]:
@@ -141,6 +178,11 @@ def bin_means() -> Shaped[F32, "J bins"]:
     functions = basis_functions(wi)[..., :NUM_OUTGOING]
     means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
     return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_OUTGOING).T, np.float32)
+
+
+@lru_cache(maxsize=1)
+def _bin_areas() -> Shaped[F32, " bins"]:
+    return bin_solid_angles().astype(np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")

@@ -180,6 +180,20 @@ def test_indirect_light_of_few_probes_follows_a_rotating_light_in_each_frame(fre
         assert picture.next_job().is_refinement
 
 
+@pytest.mark.parametrize("spare", [0, -1])
+def test_visible_probes_and_patches_limit_indirect_light_in_frames(free_bake, monkeypatch, spare):
+    """The limit counts what a frame computes, not all probes of the scene."""
+    picture = make_watched_picture(free_bake, edit_environment(rotation=340.0))
+    num_visible = np.count_nonzero(picture.gbuffer.is_needed)
+    assert num_visible < free_bake.stored_scene.probes.num_points
+    limit = num_visible + 3 * free_bake.num_patches + spare
+    monkeypatch.setattr("relume.live.free_camera.probe_light.MAX_PROBES_IN_FRAME", limit)
+    for turn in (348.0, 356.0):
+        picture.set_look(make_look(free_bake, add_lights(edit_environment(rotation=turn))))
+        picture.advance(None)
+    assert picture.next_job().is_refinement == (spare == 0)
+
+
 @pytest.mark.usefixtures("many_probes")
 def test_indirect_light_lags_behind_a_rotating_light_and_converges(free_bake):
     turns = [make_look(free_bake, add_lights(edit_environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]

@@ -8,7 +8,7 @@ import pytest
 
 from relume.brdf.albedo import PAIRS, material_reflectance, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
-from relume.math.direction_grid import bin_solid_angles
+from relume.math.direction_grid import SIDE, bin_solid_angles
 from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, recurrence
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
@@ -133,3 +133,28 @@ def test_light_is_nowhere_negative_and_its_flux_remains():
     areas = bin_solid_angles()
     flux = np.maximum(np.einsum("pbc,b->pc", plain, areas), 0)
     np.testing.assert_allclose(np.einsum("pbc,b->pc", positive, areas), flux, atol=2e-3 * flux.max())
+
+
+@pytest.mark.parametrize("is_positive", [False, True])
+def test_tables_equal_numpy(is_positive):
+    rng = np.random.default_rng(11)
+    even, rows = np.zeros((NO_PATCH + 1, 3), np.float32), np.array([1, 4, 5, 9])
+    even[:10] = rng.uniform(0, 1, (10, 3))
+    coefficients = rng.normal(size=(4, 3, NUM_OUTGOING)).astype(np.float32)
+    decay, extra = rng.uniform(0.001, 0.01, 4).astype(np.float32), rng.uniform(0, 2, (2, 3, SIDE * SIDE))
+    light = radiance_from_patch(
+        even, rows, np.zeros((4, 2, 3), np.float32), coefficients, decay, (np.array([1, 3]), extra.astype(np.float32)),
+        is_positive=is_positive,
+    )  # fmt: skip
+    degree = np.repeat(np.arange(OUTGOING_DEGREE + 1), np.arange(OUTGOING_DEGREE + 1) + 1)
+    window = np.exp(-np.outer(decay, degree * (degree + 2.0)))
+    for table, factor in ((light.table, np.ones_like(window)), (light.smooth, window)):
+        expected = np.einsum("gcj,gj,jb->gbc", coefficients, factor, bin_means())
+        expected[[1, 3]] += extra.transpose(0, 2, 1)
+        expected += even[rows, None]
+        if is_positive:
+            flux = np.maximum(np.einsum("b,gbc->gc", bin_solid_angles(), expected), 0)
+            clipped = np.maximum(expected, 0)
+            expected = clipped * (flux / np.einsum("b,gbc->gc", bin_solid_angles(), clipped))[:, None]
+        radiance = even[rows, None] + light.scale[:, None] * table
+        np.testing.assert_allclose(radiance, expected, atol=light.scale.max())

@@ -1,8 +1,8 @@
 """Incident coefficients of one session's free-camera image, under changing light.
 
 Exact coefficients are computed when a drag ends. During a drag, direct light is computed in every frame for visible
-probes. If lights change, so is indirect light in scenes of few probes. Elsewhere it takes longer than a frame: it is
-computed in the background, and frames use the latest result (`Priority.UPDATE`).
+probes. If lights change, so is indirect light if these probes and the patches are few. Otherwise it takes longer than
+a frame: it is computed in the background, and frames use the latest result (`Priority.UPDATE`).
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from relume.transport.incident_coefficients import add_scaled
 
 F32 = NDArray[np.float32]
 
-MAX_PROBES_IN_FRAME = 20_000
-"""Probes whose indirect light is computed within a frame when lights change: some hundredths of a second."""
+MAX_PROBES_IN_FRAME = 60_000
+"""Probes whose indirect light is computed within a frame when lights change: a tenth of a second of processor time."""
+_PROBES_PER_PATCH = 3  # that take as long as the bounces of one patch
 
 
 class IndirectCoefficients(NamedTuple):
@@ -234,13 +235,18 @@ class ProbeLightState:
     def _latest_indirect(self, light: Illumination, is_needed: NDArray[np.uint8]) -> IndirectCoefficients:
         """Return the latest indirect light; compute it if there is none, or if few probes need another."""
         transfer, last = self._transfer, self._indirect
-        follows = len(is_needed) <= MAX_PROBES_IN_FRAME
+        follows = self._fits_in_frame(is_needed)
         is_outdated = follows and self._is_indirect_outdated(light)
         if last is None or is_outdated or last.light.paths.has_indirect != light.paths.has_indirect:
             before = light if follows or self._exact is None else self._exact[0].light
             is_reusable = before.paths.has_indirect == light.paths.has_indirect and _is_cached(transfer, before)
             last = _indirect_of(transfer, before if is_reusable else light, is_needed)
         return _extend(transfer, last, is_needed)
+
+    def _fits_in_frame(self, is_needed: NDArray[np.uint8]) -> bool:
+        """Return whether the indirect light of these probes takes no longer than a frame may."""
+        cost = np.count_nonzero(is_needed) + _PROBES_PER_PATCH * self._transfer.num_patches
+        return bool(cost <= MAX_PROBES_IN_FRAME)
 
     def next_job(self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]) -> Job:
         """Return the job for missing light: indirect light of some probes first, then all exact coefficients.

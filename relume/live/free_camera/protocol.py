@@ -80,6 +80,11 @@ class FreeCameraTransfer(OpenBake, Protocol):
         ...
 
     @property
+    def num_patches(self) -> int:
+        """Number of patches with indirect light."""
+        ...
+
+    @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
     def light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:

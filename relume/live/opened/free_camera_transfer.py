@@ -255,8 +255,10 @@ class BakedFreeCamera:
         if lights.num_lights:
             vectors += self._preview_environment(lights, probes, probe_indices)
         if element.paths.has_indirect:
-            solution = self.light_transport.indirect_at_probes.solve_indirect(element, LightQuality.PREVIEW)
-            vectors += self._ray_vectors(solution.along_rays(), probe_indices)
+            solution = self.light_transport.indirect_at_probes.solve_indirect(
+                element, LightQuality.PREVIEW, is_for_rays=True
+            )
+            vectors += self._ray_vectors(solution.along_rays(is_smoothed=False), probe_indices)
         return vectors
 
     def indirect_delta(
@@ -268,7 +270,7 @@ class BakedFreeCamera:
             before, after: lights of the same sources. probe_indices: the probes.
         """
         change = self.light_transport.indirect_at_probes.solve_indirect(after, LightQuality.EXACT, start_from=before)
-        return self._ray_vectors(change.along_rays(), probe_indices)
+        return self._ray_vectors(change.along_rays(is_smoothed=False), probe_indices)
 
     def _ray_vectors(self, outgoing: OutgoingLight, probe_indices: NDArray[np.intp]) -> F32:
         return shared_direction_coefficients(
@@ -367,6 +369,11 @@ class BakedFreeCamera:
     @cached_property
     def _pattern(self) -> RayPattern:
         return ray_pattern(self.light_transport.store, self._gather_hits.shape[1])
+
+    @property
+    def num_patches(self) -> int:
+        """Number of patches with indirect light."""
+        return self.light_transport.patches.num_patches
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]:

@@ -37,9 +37,9 @@ class IndirectSolution(NamedTuple):
     outgoing: OutgoingRadiance
     virtual_lights: VirtualLights | None = None
 
-    def along_rays(self) -> OutgoingLight:
-        """Tabulate the radiance for lookups along gather rays."""
-        return self.outgoing.outgoing_light(self.patches)
+    def along_rays(self, *, is_smoothed: bool = True) -> OutgoingLight:
+        """Tabulate the radiance for lookups along rays. is_smoothed: see `OutgoingRadiance.outgoing_light`"""
+        return self.outgoing.outgoing_light(self.patches, is_smoothed=is_smoothed)
 
     def mean_to_others(self) -> Shaped[F32, "patches 3"]:
         """Return the mean radiance of each patch toward other patches."""
@@ -70,6 +70,7 @@ class _Approximation(NamedTuple):
 
 _EXACT = _Approximation(True, True, Directions.EXACT)
 _PREVIEW = _Approximation(False, False, Directions.BINNED)
+_PREVIEW_FOR_RAYS = _Approximation(False, True, Directions.BINNED)
 _EXACT_CHANGE = _Approximation(True, True, Directions.BINNED)
 _CHANGE_OF_SURFACES = _Approximation(True, False, Directions.BINNED)
 _CHANGE_OF_LIGHTS = _Approximation(False, False, Directions.NONE)
@@ -103,6 +104,8 @@ class IndirectSolver:
         quality: LightQuality,
         start_from: Illumination | None = None,
         is_canceled: Callable[[], bool] = lambda: False,
+        *,
+        is_for_rays: bool = False,
     ) -> IndirectSolution:
         """Solve for the outgoing radiance of all patches, or for its change.
 
@@ -118,6 +121,7 @@ class IndirectSolver:
         |---|---|---|---|---|---|
         | exact | any | | | bins | few rays |
         | preview | none | few samples, small maps | low degree | bins | few rays |
+        | preview, for rays | none | few samples, small maps | tables, few samples | bins | few rays |
         | preview | surfaces | | low degree | bins | few rays |
         | preview | lights | few samples, small maps | low degree | none after the first bounce | few rays |
 
@@ -127,11 +131,13 @@ class IndirectSolver:
             light: the illumination. quality: see above.
             start_from: light of an earlier solution; None: from scratch.
             is_canceled: polled while rays of overridden normals are traced.
+            is_for_rays: only `IndirectSolution.along_rays` is used: means leave tables out.
         Raises:
             CancelledError: `is_canceled` returned true.
         """
         if start_from is None:
-            approximation = _PREVIEW if quality is LightQuality.PREVIEW else _EXACT
+            preview = _PREVIEW_FOR_RAYS if is_for_rays else _PREVIEW
+            approximation = preview if quality is LightQuality.PREVIEW else _EXACT
             return self._solve(_indirect_only(light), approximation, is_canceled)
         if quality is not LightQuality.PREVIEW:
             approximation = _EXACT_CHANGE
@@ -192,7 +198,9 @@ class IndirectSolver:
             light, reflectance_operator, is_preview=not approximation.has_exact_lights
         )
         outgoing_highlights = (
-            _outgoing_highlights(light, reflectance_operator, direct_light)
+            _outgoing_highlights(
+                light, reflectance_operator, direct_light, is_preview=not approximation.has_exact_lights
+            )
             if approximation.has_sharp_highlights
             else None
         )
@@ -203,12 +211,16 @@ class IndirectSolver:
 
 
 def _outgoing_highlights(
-    light: Illumination, reflectance_operator: ReflectanceOperator, direct_light: DirectPatchLight
+    light: Illumination,
+    reflectance_operator: ReflectanceOperator,
+    direct_light: DirectPatchLight,
+    *,
+    is_preview: bool,
 ) -> OutgoingHighlights:
     """Return the direct light reflected by sharp highlights."""
     highlights = direct_light.patches.highlight_tables(light.reflectances, reflectance_operator)
     return highlights, outgoing_in_highlights(
-        direct_light.patches, highlights, direct_light.direct(light, highlights.rows)
+        direct_light.patches, highlights, direct_light.direct(light, highlights.rows, is_preview=is_preview)
     )
 
 

@@ -150,17 +150,22 @@ class DirectPatchLight:
             )
         return incident
 
-    def direct(self, light: Illumination, rows: Shaped[NDArray[np.intp], " G"]) -> DirectLobes:
-        """Return the exact direct light at the sample points of patches `rows`, per source."""
-        local_rays = ((self._local.rays(geometry, rows), gain) for geometry, gain in light.local)
+    def direct(self, light: Illumination, rows: Shaped[NDArray[np.intp], " G"], *, is_preview: bool) -> DirectLobes:
+        """Return the direct light at the sample points of patches `rows`, per source.
+
+        Args:
+            light: all light of the scene. rows: the patches.
+            is_preview: local lights only at their first points, and small maps of large environments.
+        """
+        patches, find_rays = self.patches, self._local.preview_rays if is_preview else self._local.rays
+        local_rays = ((find_rays(geometry, rows), gain) for geometry, gain in light.local)
         rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in local_rays]
+        ray_points = patches.first_points(rows) if is_preview else None
         if not light.has_environment:
-            return DirectLobes(rays=rays)
-        lights = self._exact_lights(light.environment)
-        gain = np.array(light.environment_gain, np.float32)
-        return DirectLobes(
-            replace(lights, irradiance=gain * lights.irradiance), self.patches.visibility_bits(rows), rays
-        )
+            return DirectLobes(rays=rays, ray_points=ray_points)
+        lights = self._find_lights(light.environment, LightQuality.PREVIEW if is_preview else LightQuality.EXACT)
+        lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
+        return DirectLobes(lights, patches.visibility_bits(rows), rays, ray_points)
 
     def _exact_lights(self, environment: EnvironmentKey) -> TriangleLights:
         return self._find_lights(environment, LightQuality.EXACT)
