@@ -172,7 +172,15 @@ GROUPS = (
         "relume_bench.free_camera_accuracy",
         ("free_camera.rmse_median", "free_camera.rmse_worst", "free_camera.blots"),
     ),
-    Group("relume_bench.probes_static_view", ("probes.static_view_s", "probes.correction_s")),
+    Group(
+        "relume_bench.free_camera_exact",
+        (
+            "free_camera.exact_s_cornell",
+            "free_camera.exact_s_still_life",
+            "free_camera.exact_s_interior",
+            "probes.correction_s",
+        ),
+    ),
     Group("relume_bench.free_camera_correction", ("free_camera.correction_ratio",)),
     Group("relume_bench.canvas_free_camera", ("probes.canvas_fps",)),
     Group(

@@ -11,12 +11,14 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import TO_XYZ, srgb_decode
+from relume.core.thread_pools import for_ranges
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _WHITE = TO_XYZ.sum(axis=1)
 _25_POW_7 = 25.0**7
+_ROWS_PER_RANGE = 8  # so that the intermediate values of a range stay in the cache
 
 
 def color_difference(
@@ -27,8 +29,14 @@ def color_difference(
     Args:
         first, second: sRGB display values in [0, 1].
     """
-    linear = (np.asarray(srgb_decode(np.asarray(display, np.float64)), np.float64) for display in (first, second))
-    return ciede2000(*map(to_lab, linear))
+    difference = np.empty(first.shape[:2])
+
+    def compare_rows(start: int, stop: int) -> None:
+        linear = (srgb_decode(display[start:stop].astype(np.float64)) for display in (first, second))
+        difference[start:stop] = ciede2000(*map(to_lab, linear))
+
+    for_ranges(compare_rows, len(difference), _ROWS_PER_RANGE)
+    return difference
 
 
 def to_lab(linear: Shaped[F64, "*shape 3"]) -> Shaped[F64, "*shape 3"]:

@@ -32,6 +32,7 @@ from relume.raytrace.surface_points import SurfacePoints
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 256
+_MAX_COHERENT_TRIANGLES = 20_000  # rays of neighboring points traverse trees of more triangles faster one by one
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,8 @@ def trace_gather_rays(
     """
     gather_hits = np.empty((points.num_points, pattern.num_rays), np.uint16)
     surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32)
-    args = geometry.embree.hit_tracer(coherent=False), points, wo, surfaces, tree, pattern
+    tracer = geometry.embree.hit_tracer(coherent=len(geometry.faces) <= _MAX_COHERENT_TRIANGLES)
+    args = tracer, points, wo, surfaces, tree, pattern
     counts: list[int] = []
 
     def kernel(start: int, stop: int) -> None:

@@ -62,7 +62,7 @@ def weights_from_nearby_probes(
     raw = np.square((reach - inside) / (reach * inside)) if num_neighbors > 1 else inside
     raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # of another material, if its own has too few probes
     raw[:, 0] = np.maximum(raw[:, 0], 1e-12)
-    node_weights = _empty_weights(len(node_features))
+    node_weights = empty_weights(len(node_features))
     node_weights.weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
     node_weights.probe[:, : raw.shape[1]] = neighbors[:, : raw.shape[1]]
     for start in range(0, len(node_features), _NODES_PER_BATCH):
@@ -139,7 +139,7 @@ def _select_heaviest(weights: csr_array) -> NodeWeights:
     order = np.lexsort((-weights.data, row))
     rank = np.arange(len(order)) - np.repeat(weights.indptr[:-1], count)
     is_heaviest = rank < PROBES_PER_NODE
-    node_weights = _empty_weights(len(count))
+    node_weights = empty_weights(len(count))
     node_weights.probe[row[is_heaviest], rank[is_heaviest]] = weights.indices[order[is_heaviest]]
     node_weights.weight[row[is_heaviest], rank[is_heaviest]] = weights.data[order[is_heaviest]]
     return NodeWeights(node_weights.probe, _normalize(node_weights.weight))
@@ -151,6 +151,7 @@ def _normalize(weight: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(thresholded / thresholded.sum(axis=1, keepdims=True), weight.dtype)
 
 
-def _empty_weights(num: int) -> NodeWeights:
+def empty_weights(num: int) -> NodeWeights:
+    """Return zero weights. num: number of nodes"""
     shape = num, PROBES_PER_NODE
     return NodeWeights(np.zeros(shape, np.uint32), np.zeros(shape, np.float32))

@@ -18,6 +18,8 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.probes.interpolation_weights import (
     MATERIAL_SEPARATION,
+    NodeWeights,
+    empty_weights,
     weights_from_edge_ends,
     weights_from_nearby_probes,
 )
@@ -121,10 +123,8 @@ def build_nodes(
         The merged nodes, and the merged index of each grid node.
     """
     first, node_index = _merge_nodes(grid_nodes, _SAME_NODE_DISTANCE, _SAME_NODE_NORMAL_STEPS)
-    features, seed_nodes = _features(grid_nodes), np.flatnonzero(grid_nodes.is_candidate[first])
-    seed_weights = weights_from_nearby_probes(
-        features[probe_nodes], features[first[seed_nodes]], grid_nodes.surface_points.normal[first[seed_nodes]]
-    )
+    seed_nodes = np.flatnonzero(grid_nodes.is_candidate[first])
+    seed_weights = _seed_weights(grid_nodes, probe_nodes, first[seed_nodes])
     node_weights = (
         seed_weights
         if len(seed_nodes) == len(first)
@@ -135,11 +135,29 @@ def build_nodes(
     ), node_index.astype(np.uint32)
 
 
-def _features(grid_nodes: NodeTable) -> F64:
+def _seed_weights(grid_nodes: NodeTable, probe_nodes: NDArray[np.intp], seeds: NDArray[np.intp]) -> NodeWeights:
+    """Interpolation weights of candidate nodes.
+
+    Each node measures distances in the spacing around itself: in a finer one, probes of a bent or opposite surface
+    nearby would be nearer than those of its own.
+
+    Args:
+        grid_nodes: grid nodes of all grids. probe_nodes: those that are probes. seeds: the candidates.
+    """
+    seed_weights = empty_weights(len(seeds))
+    for spacing in np.unique(grid_nodes.spacing[seeds]):
+        rows = np.flatnonzero(grid_nodes.spacing[seeds] == spacing)
+        features, normals = _features(grid_nodes, spacing), grid_nodes.surface_points.normal[seeds[rows]]
+        weights = weights_from_nearby_probes(features[probe_nodes], features[seeds[rows]], normals)
+        seed_weights.probe[rows], seed_weights.weight[rows] = weights
+    return seed_weights
+
+
+def _features(grid_nodes: NodeTable, spacing: float) -> F64:
     """Coordinates, in spacings, in which nearest probes are searched: position, normal, material, side, component. (n,
     11)
     """
-    position = grid_nodes.surface_points.position.astype(np.float64) / grid_nodes.spacing.min()
+    position = grid_nodes.surface_points.position.astype(np.float64) / spacing
     separation = MATERIAL_SEPARATION * np.column_stack([grid_nodes.material, grid_nodes.side])
     component_offset = np.random.default_rng(1).normal(size=(int(grid_nodes.component.max()) + 1, 3))
     component_offset *= _COMPONENT_SEPARATION / np.sqrt(2) / np.linalg.norm(component_offset, axis=1, keepdims=True)

@@ -185,8 +185,10 @@ def test_consecutive_patches_are_neighbors_in_space(box):
     assert np.median(step) < 0.15 * np.median(anywhere)
 
 
-def test_gather_hits_equal_first_hits(box):
+@pytest.mark.parametrize("max_coherent_triangles", [0, 1000], ids=["ray by ray", "in packets"])
+def test_gather_hits_equal_first_hits(box, max_coherent_triangles, monkeypatch):
     """Every ray is traced separately and located directly."""
+    monkeypatch.setattr("relume.patches.gather_hits._MAX_COHERENT_TRIANGLES", max_coherent_triangles)
     _, geometry, patches = box
     points, pattern = points_of(patches, 40, first=100), make_pattern(24, 9, 3)
     links = trace_gather_rays(geometry, patches.tree, points, points.normal, pattern)

@@ -1,5 +1,7 @@
 """Probe density: higher near cameras and at shadow edges."""
 
+import itertools
+
 import numpy as np
 import pytest
 from session_edits import relative_rmse
@@ -14,7 +16,7 @@ from relume.output.render_image import render_image
 from relume.probes.density import density_from_distance, density_from_shadows
 from relume.probes.interpolation_weights import make_weights_linear
 from relume.probes.mesh_lattice import make_corner_grid, place_probes
-from relume.probes.triangle_grids import enumerate_nodes
+from relume.probes.triangle_grids import ProbeDensity, enumerate_nodes
 from relume.probes.visible_sides import visible_sides
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
@@ -140,3 +142,23 @@ def test_weights_reproduce_linear_light():
     assert (difference[1] < 1.01 * difference[0]).all()
     assert weights.min() >= 0
     np.testing.assert_allclose(weights.sum(axis=1), 1)
+
+
+def test_coarse_nodes_use_no_fine_probes_of_another_surface():
+    """A thin plate of narrow strips, whose rim has the finest probes: they are nearer than those of the top."""
+    x = np.linspace(-1, 1, 41)
+    top = [[[a, 0.01, -1], [a, 0.01, 1], [b, 0.01, 1], [b, 0.01, -1]] for a, b in itertools.pairwise(x)]
+    rim = [[[-1, 0, z], [1, 0, z], [1, 0.01, z], [-1, 0.01, z]] for z in (-1, 1)]
+    plate = [quad(f"side {k}", corners, 0) for k, corners in enumerate(top + rim)]
+    gray = [Material("Plate", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
+    scene = make_tiny_scene(*plate, camera=make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.5), materials=gray)
+    geometry = build_scene_buffers(scene)
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    lattice = make_corner_grid(is_open)
+    face = enumerate_nodes(lattice.num_rows).grid // 2
+    power = np.where(np.abs(geometry.face_normals[face, 1]) > 0.5, 2, -4).astype(np.int8)
+    placed = place_probes(geometry, is_open, ProbeDensity(lattice, power), 1500)
+    nodes, normals = placed.lattice_nodes, placed.probes.normal[placed.lattice_nodes.probe]
+    cosine = np.einsum("nc,nkc->nk", nodes.normal, normals)
+    assert (np.abs(nodes.normal[:, 1]) > 0.99).sum() > 2 * (np.abs(placed.probes.normal[:, 1]) > 0.99).sum()
+    assert np.where(cosine < 0.5, nodes.weight, 0).sum(axis=1).max() < 0.1

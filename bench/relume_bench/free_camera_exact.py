@@ -1,13 +1,14 @@
-"""probes.static_view_s, probes.correction_s: waiting times after the camera stops.
+"""free_camera.exact_s_cornell, _still_life, _interior, probes.correction_s: waiting times after the camera stops.
 
-The camera of the still life, 640×480, moves sideways twice, and then stays until the image has converged; the median of
+The camera of each scene, 640×480, moves sideways twice, and then stays until the image has converged; the median of
 both. From the camera's last move to the encoded exact image, without the quarter of a second that a session waits
 first. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
-under a look without indirect light, for which no gather rays are traced. `free_camera_error` is the error of the
-free-camera image against the exact one that replaces it, including edges, which only the exact one antialiases.
+under a look without indirect light, for which no gather rays are traced. `processor_s`: processor time of all threads.
+`free_camera_error` is the error of the free-camera image against the exact one that replaces it, including edges,
+which only the exact one antialiases.
 
-`probes.correction_s` ends with the free-camera image that exact direct light has corrected; `first_error` is its error
-against the exact one, `its_…` are of the Cornell box.
+`probes.correction_s`, of the still life, ends with the free-camera image that exact direct light has corrected;
+`first_error` is its error against the exact one, `cornell_box_s` and `interior_s` are of the other scenes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,49 +40,51 @@ from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 
 _CACHE_BYTES = 4 << 30
+_SCENES = {"cornell": "cornell_box", "still_life": "still_life", "interior": "interior"}
 
 
 class _Convergence(NamedTuple):
-    """Seconds until the exact image, those of tracing, and until the corrected image; errors.
+    """Seconds until the exact image, those of tracing, processor time, seconds until the corrected image; errors.
 
     `error` and `first_error` are the relative RMSE of the free-camera image, and of the corrected one.
     """
 
     convergence_s: float
     tracing_s: float
+    processor_s: float
     error: float
     first_s: float
     first_error: float
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake both scenes, move the camera, wait."""
-    still_life = _measure_scene("interior" if tiny else "still_life", (64, 48) if tiny else (640, 480), tiny)
-    box = still_life if tiny else _measure_scene("cornell_box", (400, 400), tiny)
-    whole, direct = still_life
-    context = {
+    """Bake each scene, move the camera, wait."""
+    by_scene = {name: _measure_scene(scene, tiny) for name, scene in _SCENES.items()}
+    threads = {"threads": num_threads()}
+    figures = [
+        Figure(f"free_camera.exact_s_{name}", whole.convergence_s, "s", {**_context(whole, direct), **threads})
+        for name, (whole, direct) in by_scene.items()
+    ]
+    still_life = by_scene["still_life"][0]
+    errors = {"free_camera_error": still_life.error, "first_error": still_life.first_error}
+    others = {f"{_SCENES[name]}_s": by_scene[name][0].first_s for name in ("cornell", "interior")}
+    return [*figures, Figure("probes.correction_s", still_life.first_s, "s", {**errors, **others, **threads})]
+
+
+def _context(whole: _Convergence, direct: _Convergence) -> dict[str, Any]:
+    """Context of a scene's figure."""
+    return {
         "size": "640×480",
         "tracing_s": whole.tracing_s,
+        "processor_s": whole.processor_s,
         "direct_s": direct.convergence_s,
         "free_camera_error": whole.error,
     }
-    box_context = {
-        "cornell_box_400": box[0].convergence_s,
-        "its_tracing_s": box[0].tracing_s,
-        "its_direct_s": box[1].convergence_s,
-    }
-    errors = {"size": "640×480", "free_camera_error": whole.error, "first_error": whole.first_error}
-    errors |= {"cornell_box_error": box[0].error, "cornell_box_first_error": box[0].first_error}
-    threads = {"threads": num_threads()}
-    return [
-        Figure("probes.static_view_s", whole.convergence_s, "s", {**context, **box_context, **threads}),
-        Figure("probes.correction_s", whole.first_s, "s", {**errors, "cornell_box_400": box[0].first_s, **threads}),
-    ]
 
 
-def _measure_scene(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Convergence, _Convergence]:
+def _measure_scene(name: str, tiny: bool) -> tuple[_Convergence, _Convergence]:
     """With all light, and with direct light only."""
-    scene = built_in(name)
+    scene, size = built_in(name), (64, 48) if tiny else (640, 480)
     recipe = Recipe("probes", (scene.cameras[0].name,), size, 60 if tiny else 1000, num_probes=2000 if tiny else 50_000)
     with tempfile.TemporaryDirectory() as folder:
         path = bake_in_process(METHODS["probes"], scene, recipe, Path(folder) / "moving.zarr")
@@ -115,7 +118,8 @@ def _measure_convergence(scene: Scene, picture: ProgressivePicture, step: int, s
     to_world[:3, 3] += 0.01 * (step + 1) * to_world[:3, 0]
     picture.set_camera(replace(camera, to_world=to_world), size)
     picture.advance(None)
-    before, start_time, first, first_s, tracing_s = picture.image().copy(), time.perf_counter(), None, 0.0, 0.0
+    before, first, first_s, tracing_s = picture.image().copy(), None, 0.0, 0.0
+    start_time, processor_start = time.perf_counter(), time.process_time()
     while (job := picture.next_job()) is not None:
         job_began = time.perf_counter()
 
@@ -130,9 +134,10 @@ def _measure_convergence(scene: Scene, picture: ProgressivePicture, step: int, s
             picture.encode(picture.all_tiles(), "rgb9e5")
             first, first_s = picture.image().copy(), time.perf_counter() - start_time
     picture.encode(picture.all_tiles(), "rgb9e5")
-    convergence_s, exact = time.perf_counter() - start_time, picture.image()
+    convergence_s, processor_s = time.perf_counter() - start_time, time.process_time() - processor_start
+    exact = picture.image()
     first_error = _error(before if first is None else first, exact)
-    return _Convergence(convergence_s, tracing_s, _error(before, exact), first_s, first_error)
+    return _Convergence(convergence_s, tracing_s, processor_s, _error(before, exact), first_s, first_error)
 
 
 def _error(image: NDArray[np.float32], exact: NDArray[np.float32]) -> float:
