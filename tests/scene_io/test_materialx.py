@@ -16,9 +16,9 @@ from relume.core.color import srgb_decode
 from relume.core.errors import MaterialError
 from relume.scene.model import Texture
 from relume.scene.texture_encoding import decode
-from relume.scene_io.gltf.materials import ReadMaterial
 from relume.scene_io.materialx.import_document import MaterialXDocument, import_materialx
 from relume.scene_io.referenced_files import Folder, NamedFiles
+from relume.scene_io.surfaces.make_material import ReadMaterial
 
 pytest.importorskip("MaterialX", reason="pip install relume[materialx]")
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "materialx"

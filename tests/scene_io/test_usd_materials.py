@@ -289,8 +289,8 @@ def test_what_a_shader_has_beyond_the_supported_is_one_warning_each() -> None:
     }"""
     scene = imported(usda(painted(f"{RGB}\nfloat inputs:displacement = .1", nodes)))
     assert [str(warning) for warning in scene.warnings] == [
+        "diffuseColor of material “Paint” has its default: node “Image” (Fancy) isn't supported.",
         "Displacement of material “Paint” isn't supported; its surface is smooth.",
-        "“diffuseColor” of material “Paint” comes from the node “Fancy”, which isn't supported; it has its default.",
     ]
     unknown = imported(usda(painted("").replace("UsdPreviewSurface", "Fancy")))
     assert list(unknown.warnings) == ["Material “Paint” is shown gray: its shader “Fancy” isn't supported."]

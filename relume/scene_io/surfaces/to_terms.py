@@ -23,7 +23,7 @@ from relume.brdf.term import Term
 from relume.brdf.texture_slots import ROUGHNESS
 from relume.math.angle_bands import band_averages
 from relume.scene.model import Texture
-from relume.scene_io.gltf.sheen import sheen_attenuation, sheen_term
+from relume.scene_io.surfaces.sheen import sheen_attenuation, sheen_term
 
 F64 = NDArray[np.float64]
 COAT_F0 = 0.04

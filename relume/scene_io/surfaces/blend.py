@@ -16,8 +16,8 @@ from jaxtyping import Shaped
 
 from relume.scene.model import Texture, TextureEncoding
 from relume.scene.texture_encoding import F32, F64, ROWS_PER_BATCH, SRGB_TO_LINEAR, U8, encode_rows
-from relume.scene_io.gltf.texture_resampling import Raster
-from relume.scene_io.gltf.to_terms import dielectric_reflectance
+from relume.scene_io.surfaces.texture_resampling import Raster
+from relume.scene_io.surfaces.to_terms import dielectric_reflectance
 
 
 @dataclass(frozen=True)
