@@ -8,7 +8,7 @@ from typing import Any
 
 from relume.scene.validate import MAX_IOR
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_inputs import Color, Rgb, Scalar, SurfaceInputs, lerp, scaled
+from relume.scene_io.surfaces.surface_inputs import Color, Scalar, SurfaceInputs, lerp, scaled
 from relume.scene_io.surfaces.surface_parameters import BLACK, WHITE, from_microfacet_widths
 
 _COAT_IOR = 1.5  # of the term
@@ -43,7 +43,7 @@ def subsurface_base(inputs: SurfaceInputs, base: Color, weight: float, subsurfac
     return subsurface if weight >= 0.5 else base
 
 
-def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, **differences: bool) -> Rgb:
+def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, **differences: bool) -> Color:
     """The factor of the layers below a coat that absorbs light; all approximations of the coat are one warning.
 
     Args:
@@ -52,7 +52,7 @@ def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, **differences: 
     """
     if not isinstance(weight, ImageInput) and weight == 0:
         return WHITE
-    color = inputs.constant_color("coat_color", WHITE)
+    color = inputs.color("coat_color", WHITE)
     ignored = [f"its index of refraction {ior:g} is shown as {_COAT_IOR}"] * (
         abs(ior - _COAT_IOR) > _VISIBLE_IOR_DIFFERENCE
     )
@@ -60,7 +60,9 @@ def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, **differences: 
     ignored += ["it is tinted the same from all sides"] * (color != WHITE)
     if ignored:
         inputs.warn_approximated(f"The coat of {inputs.label} is approximated: {', '.join(ignored)}.")
-    return WHITE if color == WHITE else lerp(WHITE, color, inputs.mean("the coat", weight)[0])
+    if color == WHITE or weight == 1:
+        return color
+    return lerp(WHITE, inputs.mean("coat_color", color), inputs.mean("the coat", weight)[0])
 
 
 _COAT_DIFFERENCES = {
@@ -94,12 +96,20 @@ def warn_dispersion(inputs: SurfaceInputs, transmission: Scalar, dispersion: flo
         inputs.warn_unsupported(f"Dispersion on {inputs.label} isn't supported; it refracts all colors alike.")
 
 
-def tinted(color: Color, tint: Rgb) -> Color:
-    """A color below a tinted coat."""
-    return color if tint == WHITE else scaled(color, tint)
+def tinted(inputs: SurfaceInputs, color: Color, tint: Color) -> Color:
+    """A color below a tinted coat; of two images, the mean of the tint.
+
+    Args:
+        inputs: get the warning. color: the color. tint: of the coat.
+    """
+    if tint == WHITE:
+        return color
+    if isinstance(tint, ImageInput) and not isinstance(color, ImageInput):
+        return scaled(tint, color)
+    return scaled(color, inputs.mean("coat_color", tint))
 
 
-def transmission_layer(inputs: SurfaceInputs, weight_name: str, thin_name: str, tint: Rgb) -> dict[str, Any]:
+def transmission_layer(inputs: SurfaceInputs, weight_name: str, thin_name: str, tint: Color) -> dict[str, Any]:
     """The parameters of transmission, from the inputs that OpenPBR and Standard Surface share.
 
     Args:
@@ -114,7 +124,7 @@ def transmission_layer(inputs: SurfaceInputs, weight_name: str, thin_name: str, 
     depth = inputs.number("transmission_depth", 0.0, 1e6)
     layer = {"transmission": weight, "thickness": 0.0 if inputs.number(thin_name, 0.0) > 0 else depth or 1.0}
     if depth == 0:
-        return {**layer, "transmission_color": tinted(inputs.color("transmission_color", WHITE), tint)}
+        return {**layer, "transmission_color": tinted(inputs, inputs.color("transmission_color", WHITE), tint)}
     inside = inputs.constant_color("transmission_color", WHITE)
     return {**layer, "transmission_color": tint, "attenuation_distance": depth, "attenuation_color": inside}
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -29,9 +30,9 @@ from relume.scene_io.surfaces.material_textures import (
     split_strength,
 )
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+from relume.scene_io.surfaces.surface_parameters import WHITE, SurfaceParameters
 from relume.scene_io.surfaces.texture_resampling import NOISE, Raster
-from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface, make_terms
+from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface, f82_coefficient, make_terms
 from relume.scene_io.surfaces.uv_transforms import UvSlot
 
 F64 = NDArray[np.float64]
@@ -112,7 +113,12 @@ class SurfaceMaterials:
         emission_textures = self._emission_textures(surface, textures)
         if coat_layer.coat > 0:
             self._warn_coat_normals(surface, label, has_normal_map=normal_map is not None)
-        base = replace(base, diffuse=base.diffuse * (1 - transmission), has_normal_map=normal_map is not None)
+        base = replace(
+            base,
+            diffuse=base.diffuse * (1 - transmission),
+            edge_loss=self._edge_loss(surface, textures),
+            has_normal_map=normal_map is not None,
+        )
         material = Material(
             name,
             make_terms(base, coat_layer),
@@ -157,7 +163,8 @@ class SurfaceMaterials:
         specular_reflectance = 0.0 if blend.reflectance_varies else blend.mean_reflectance()
         if raster.empty:
             f0 = lerp(weight * np.minimum(dielectric, 1), factor, metallic)
-            return PbrSurface(factor * (1 - metallic), f0, lerp(weight, 1, metallic), roughness, specular_reflectance)
+            f90 = lerp(weight, 1, metallic)
+            return PbrSurface(factor * (1 - metallic), f0, f90, roughness, specular_reflectance)
         layers = {"diffuse": self._count_texels(blend.diffuse())}
         if roughness > 0 and raster.varies("packed", 1):
             layers["roughness"] = self._count_texels(_normalize_roughness(raster))
@@ -167,6 +174,13 @@ class SurfaceMaterials:
         mean_f0 = np.maximum(mean_f0, 1e-4)
         layers["specular"] = self._count_texels(blend.normalized_f0(mean_f0, highest))
         return PbrSurface(factor, mean_f0, f90, roughness, specular_reflectance, layers)
+
+    def _edge_loss(self, surface: SurfaceParameters, textures: MaterialTextures) -> Shaped[F64, " 3"]:
+        """Coefficient of the metal's F82-tint; zeros without an edge tint."""
+        if surface.edge_tint == WHITE:
+            return np.zeros(3)
+        metallic = textures.mean(surface.metallic, "metallic")
+        return metallic * f82_coefficient(textures.mean(surface.base_color, "base color"), np.array(surface.edge_tint))
 
     def _glass(
         self, surface: SurfaceParameters, base: PbrSurface, transmission: float, textures: MaterialTextures, label: str

@@ -99,7 +99,7 @@ class MaterialTextures:
         self.transforms = UvTransforms([texture.slot for texture in self._textures.values()], label, warnings)
 
     def layout(self) -> TextureLayout | None:
-        """Where the textures are; None if there are none."""
+        """Place and size of the textures; None without any."""
         if not self._textures:
             return None
         shapes = [self._tiled(texture)[0].shape for texture in self._textures.values()]

@@ -11,7 +11,7 @@ from relume.scene_io.surfaces.node_values import NodeValues, Port, PrimvarRefere
 from relume.scene_io.surfaces.open_pbr import open_pbr
 from relume.scene_io.surfaces.preview_surface import preview_surface
 from relume.scene_io.surfaces.standard_surface import standard_surface
-from relume.scene_io.surfaces.surface_images import SurfaceImages
+from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
 from relume.scene_io.surfaces.surface_inputs import SurfaceInputs, Value
 from relume.scene_io.surfaces.surface_parameters import WHITE, SurfaceParameters
 
@@ -23,10 +23,8 @@ MODELS = {
 }
 MESH_COLORS = "displayColor"  # primvar
 _BASE_COLORS = ("base_color", "diffuseColor")
-_UNUSED = (
-    *("tangent", "geometry_tangent", "coat_normal", "geometry_coat_normal", "geometry_coat_tangent"),
-    "clearcoat_normal",
-)
+_TANGENTS = ("tangent", "geometry_tangent", "geometry_coat_tangent")
+_COAT_NORMALS = ("coat_normal", "geometry_coat_normal", "clearcoat_normal")
 
 
 class SurfaceReader:
@@ -47,7 +45,7 @@ class SurfaceReader:
         """
         values, has_mesh_colors = dict[str, Value](), False
         for name, value in self._nodes.surface(ports, label).items():
-            if name in _UNUSED:
+            if name in _TANGENTS or (name in _COAT_NORMALS and isinstance(value, ImageInput)):
                 self._warnings.append(unsupported(f"{name} of {label} isn't supported."))
             elif not isinstance(value, PrimvarReference):
                 values[name] = value

@@ -40,13 +40,20 @@ def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
     transmission = transmission_layer(inputs, "transmission_weight", "geometry_thin_walled", tint)
     warn_dispersion(inputs, transmission.get("transmission", 0), inputs.number("transmission_dispersion_scale", 0))
     warn_thin_film(inputs, inputs.number("thin_film_weight", 0))
+    metallic = inputs.scalar("base_metalness", 0)
+    specular = inputs.scalar("specular_weight", 1)
+    if metallic != 0 and specular != 1:
+        inputs.warn_approximated(
+            f"specular_weight of {inputs.label} doesn't scale the reflection of its metallic parts."
+        )
     roughness, anisotropy = anisotropic_highlight(inputs, 0.3, "specular_roughness_anisotropy", _widths)
     return SurfaceParameters(
-        base_color=tinted(base, tint),
-        metallic=inputs.scalar("base_metalness", 0),
+        base_color=tinted(inputs, base, tint),
+        metallic=metallic,
         roughness=roughness,
-        specular=inputs.scalar("specular_weight", 1),
-        specular_color=tinted(inputs.color("specular_color", WHITE), tint),
+        specular=specular,
+        specular_color=tinted(inputs, inputs.color("specular_color", WHITE), tint),
+        edge_tint=WHITE if metallic == 0 else inputs.constant_color("specular_color", WHITE),
         ior=read_ior(inputs, "specular_ior"),
         anisotropy=anisotropy,
         clearcoat=coat,

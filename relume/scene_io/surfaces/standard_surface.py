@@ -37,13 +37,18 @@ def standard_surface(inputs: SurfaceInputs) -> SurfaceParameters:
     transmission = transmission_layer(inputs, "transmission", "thin_walled", tint)
     warn_dispersion(inputs, transmission.get("transmission", 0), inputs.number("transmission_dispersion", 0, inf))
     warn_thin_film(inputs, inputs.number("thin_film_thickness", 0, inf))
+    metallic = inputs.scalar("metalness", 0)
+    if metallic != 0 and (inputs.scalar("specular", 1) != 1 or inputs.color("specular_color", WHITE) != WHITE):
+        inputs.warn_approximated(
+            f"The edge color of the metallic parts of {inputs.label} isn't supported; it is white."
+        )
     roughness, anisotropy = anisotropic_highlight(inputs, 0.2, "specular_anisotropy", _widths)
     return SurfaceParameters(
-        base_color=tinted(base, tint),
-        metallic=inputs.scalar("metalness", 0),
+        base_color=tinted(inputs, base, tint),
+        metallic=metallic,
         roughness=roughness,
         specular=inputs.scalar("specular", 1),
-        specular_color=tinted(inputs.color("specular_color", WHITE), tint),
+        specular_color=tinted(inputs, inputs.color("specular_color", WHITE), tint),
         ior=read_ior(inputs, "specular_IOR"),
         anisotropy=anisotropy,
         anisotropy_rotation=2 * pi * inputs.number("specular_rotation", 0),

@@ -23,6 +23,7 @@ class SurfaceParameters:
         specular, specular_color: factors of the dielectric's f0 and f90, and of its f0.
         ior: index of refraction; 0 for f0 = 1.
         has_f0: `specular_color` is f0 itself, whatever the index of refraction.
+        edge_tint: factor of the metal's reflectance near 82° (F82-tint, OpenPBR Surface 1.1, section 3.6).
         anisotropy: strength as in KHR_materials_anisotropy: the width along the tangent is mix(α, 1, strength²).
         anisotropy_rotation: radians, from the tangent toward the bitangent.
         anisotropy_map: as in that extension: a direction in two channels, and a factor of the strength.
@@ -49,6 +50,7 @@ class SurfaceParameters:
     specular_color: Color = WHITE
     ior: float = 1.5
     has_f0: bool = False
+    edge_tint: Rgb = WHITE
     anisotropy: float = 0.0
     anisotropy_rotation: float = 0.0
     anisotropy_map: ImageInput | None = None

@@ -117,10 +117,8 @@ class UsdPort:
     def numbers(self) -> tuple[float, ...]:
         """See `Port.numbers`."""
         value = self._value()
-        if value is None:
-            return ()
-        if isinstance(value, str) and value in _TOKENS:
-            return (_TOKENS[value],)
+        if value is None or isinstance(value, str):
+            return (_TOKENS[value],) if value in _TOKENS else ()
         try:
             numbers = np.asarray(value, np.float64).reshape(-1)
         except (TypeError, ValueError):
