@@ -34,7 +34,7 @@ class DocumentNode:
         return str(self.element.getType())
 
     def port(self, name: str) -> DocumentPort | None:
-        """See `Node.port`."""
+        """See `ShaderNode.port`."""
         port = self.element.getInput(name)
         return None if port is None else DocumentPort(port)
 

@@ -80,11 +80,11 @@ class _DocumentImages:
     warnings: list[ImporterWarning]
 
     def read(self, file: str, label: str) -> bytes | None:
-        """See `ImageFiles.read`."""
+        """See `DocumentFiles.read`."""
         return read_companion(self.companions, "", first_tile(file, self.warnings), label, self.warnings)
 
     def printable_name(self, file: str) -> str:
-        """See `ImageFiles.printable_name`."""
+        """See `DocumentFiles.printable_name`."""
         return printable(file)
 
 

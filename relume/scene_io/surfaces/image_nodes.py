@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from relume.core.import_warnings import quote
-from relume.scene_io.surfaces.node_values import AUTO, Node, NodeValues, Port, UnsupportedNodeError, normal_vector
+from relume.scene_io.surfaces.node_values import AUTO, NodeValues, Port, ShaderNode, UnsupportedNodeError, normal_vector
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Rgb, Value, scaled
 from relume.scene_io.surfaces.texture_coordinates import ONE, ZERO, Placement
@@ -16,7 +16,7 @@ _EXTENDED = ("constant", "black", "useMetadata")  # images have no metadata abou
 _UVS = ("texcoord", "geompropvalue", "UsdPrimvarReader")
 
 
-def image(values: NodeValues, node: Node, output: str) -> ImageInput:
+def image(values: NodeValues, node: ShaderNode, output: str) -> ImageInput:
     """The image of a node `image` or `tiledimage`: u′ = (u · tiling − offset) · tile size / image size.
 
     Args:
@@ -29,17 +29,17 @@ def image(values: NodeValues, node: Node, output: str) -> ImageInput:
     return _read(values, node, placement.then((tile_width / (width or 1), tile_height / (height or 1)), ZERO))
 
 
-def gltf_image(values: NodeValues, node: Node, output: str) -> ImageInput:
+def gltf_image(values: NodeValues, node: ShaderNode, output: str) -> ImageInput:
     """The image of a node `gltf_image`. See `image`."""
     return _scaled(_gltf_image(values, node, 0), values.numbers(node, "factor", _WHITE))
 
 
-def gltf_normalmap(values: NodeValues, node: Node, output: str) -> Value:
+def gltf_normalmap(values: NodeValues, node: ShaderNode, output: str) -> Value:
     """The normals of a node `gltf_normalmap`. See `image`."""
     return normal_vector(_gltf_image(values, node, 0), _WHITE)
 
 
-def gltf_colorimage(values: NodeValues, node: Node, output: str) -> ImageInput:
+def gltf_colorimage(values: NodeValues, node: ShaderNode, output: str) -> ImageInput:
     """The color of a node `gltf_colorimage`, or its opacity. See `image`."""
     read = _gltf_image(values, node, 1)
     if output == "outa":
@@ -48,7 +48,7 @@ def gltf_colorimage(values: NodeValues, node: Node, output: str) -> ImageInput:
     return _scaled(read, values.numbers(node, "geomcolor", _WHITE))
 
 
-def uv_texture(values: NodeValues, node: Node, output: str, wrap: str = "periodic") -> ImageInput:
+def uv_texture(values: NodeValues, node: ShaderNode, output: str, wrap: str = "periodic") -> ImageInput:
     """The image of a node `UsdUVTexture`: texels · scale + bias, in linear values.
 
     Args:
@@ -82,7 +82,7 @@ def _scaled(read: ImageInput, factor: Rgb) -> ImageInput:
     return product
 
 
-def _gltf_image(values: NodeValues, node: Node, default_order: int) -> ImageInput:
+def _gltf_image(values: NodeValues, node: ShaderNode, default_order: int) -> ImageInput:
     """Scale, rotation and offset are those of glTF, as if v ran from the top."""
     u_scale, v_scale = values.pair(node, "scale", ONE)
     u, v = values.pair(node, "offset", ZERO)
@@ -98,7 +98,7 @@ def _gltf_image(values: NodeValues, node: Node, default_order: int) -> ImageInpu
 
 def _read(
     values: NodeValues,
-    node: Node,
+    node: ShaderNode,
     placement: Placement,
     wraps: tuple[str, str] = ("uaddressmode", "vaddressmode"),
     wrap: str = "periodic",
@@ -133,7 +133,7 @@ def _read(
     )
 
 
-def _placement(values: NodeValues, node: Node, name: str) -> Placement:
+def _placement(values: NodeValues, node: ShaderNode, name: str) -> Placement:
     """The transform of the texture coordinates that an input of a node has."""
     port = node.port(name)
     source = None if port is None else port.node()
@@ -165,7 +165,7 @@ def _placement(values: NodeValues, node: Node, name: str) -> Placement:
     )
 
 
-def _is_offset_first(values: NodeValues, node: Node, default: int) -> bool:
+def _is_offset_first(values: NodeValues, node: ShaderNode, default: int) -> bool:
     return values.pair(node, "operationorder", (float(default), 0.0))[0] == 1
 
 

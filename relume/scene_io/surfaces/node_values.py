@@ -39,7 +39,7 @@ class Port(Protocol):
     @property
     def is_color(self) -> bool: ...
 
-    def node(self) -> tuple[Node, str] | None:
+    def node(self) -> tuple[ShaderNode, str] | None:
         """The node that it is connected to, and the name of its output."""
         ...
 
@@ -56,7 +56,7 @@ class Port(Protocol):
         ...
 
 
-class Node(Protocol):
+class ShaderNode(Protocol):
     """A node of a graph. `category` is as in MaterialX or USD, `type` as in MaterialX, empty if unknown."""
 
     @property
@@ -82,7 +82,7 @@ class PrimvarReference:
 
 
 NodeValue = Value | PrimvarReference
-ImageNode = Callable[["NodeValues", Node, str], NodeValue]
+ImageNode = Callable[["NodeValues", ShaderNode, str], NodeValue]
 
 
 class NodeValues:
@@ -125,7 +125,7 @@ class NodeValues:
         source = port.node()
         return self._constant(port) if source is None else self._node(*source)
 
-    def required(self, node: Node, name: str) -> Value:
+    def required(self, node: ShaderNode, name: str) -> Value:
         """The value of a node's input that has no default. Raises UnsupportedNodeError.
 
         Args:
@@ -137,7 +137,7 @@ class NodeValues:
             raise UnsupportedNodeError(f"node {quote(node.name)} {reason} {quote(name)}")
         return value
 
-    def numbers(self, node: Node, name: str, default: Rgb) -> Rgb:
+    def numbers(self, node: ShaderNode, name: str, default: Rgb) -> Rgb:
         """A constant of a node, as three numbers; see `required`.
 
         Args:
@@ -148,12 +148,12 @@ class NodeValues:
             raise UnsupportedNodeError(f"{name} of node {quote(node.name)} isn't constant")
         return default if value is None else value if isinstance(value, tuple) else (value, value, value)
 
-    def pair(self, node: Node, name: str, default: Pair) -> Pair:
+    def pair(self, node: ShaderNode, name: str, default: Pair) -> Pair:
         """As `numbers`, of two numbers; node, name, default."""
         first, second, _ = self.numbers(node, name, (*default, 0.0))
         return first, second
 
-    def text(self, node: Node, name: str, default: str = "") -> str:
+    def text(self, node: ShaderNode, name: str, default: str = "") -> str:
         """A name or file of a node; node, name, default."""
         port = node.port(name)
         return (port.text() if port is not None else "") or default
@@ -176,7 +176,7 @@ class NodeValues:
         if warning not in self._warnings:
             self._warnings.append(warning)
 
-    def _optional(self, node: Node, name: str) -> NodeValue | None:
+    def _optional(self, node: ShaderNode, name: str) -> NodeValue | None:
         port = node.port(name)
         return None if port is None else self.value(port)
 
@@ -191,12 +191,12 @@ class NodeValues:
             red, green, blue = srgb_decode(np.array([red, green, blue], np.float64)).tolist()
         return red, green, blue
 
-    def _primvar(self, node: Node) -> PrimvarReference:
+    def _primvar(self, node: ShaderNode) -> PrimvarReference:
         fallback = "fallback" if node.category == "UsdPrimvarReader" else "default"
         default = None if node.port(fallback) is None else self.numbers(node, fallback, (0.0, 0.0, 0.0))
         return PrimvarReference(self.text(node, "varname") or self.text(node, "geomprop"), default)
 
-    def _node(self, node: Node, output: str) -> NodeValue | None:
+    def _node(self, node: ShaderNode, output: str) -> NodeValue | None:
         category = node.category
         if category in self._image_nodes:
             return self._image_nodes[category](self, node, output)

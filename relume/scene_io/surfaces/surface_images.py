@@ -54,7 +54,7 @@ class ImageInput:
     default: tuple[float, float, float] | None = None
 
 
-class ImageFiles(Protocol):
+class DocumentFiles(Protocol):
     """The image files of a document, by the names that it has for them."""
 
     def read(self, file: str, label: str) -> bytes | None:
@@ -73,7 +73,7 @@ class SurfaceImages:
         files: of the document.
     """
 
-    def __init__(self, files: ImageFiles, warnings: list[ImporterWarning]) -> None:
+    def __init__(self, files: DocumentFiles, warnings: list[ImporterWarning]) -> None:
         """
         Args:
             files: of the document. warnings: gets a sentence for each image that is damaged.

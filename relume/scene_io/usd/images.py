@@ -18,12 +18,12 @@ class LayerImages:
     warnings: list[ImporterWarning]
 
     def read(self, file: str, label: str) -> bytes | None:
-        """See `ImageFiles.read`."""
+        """See `DocumentFiles.read`."""
         asset = self.layers.assets.get(file)
         if asset is None:
             return None
         return self.layers.read(replace(asset, name=first_tile(asset.name, self.warnings)), "image")
 
     def printable_name(self, file: str) -> str:
-        """See `ImageFiles.printable_name`."""
+        """See `DocumentFiles.printable_name`."""
         return printable(self.layers.assets[file].name)

@@ -11,14 +11,14 @@ import numpy as np
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.surfaces.image_nodes import IMAGE_NODES, uv_texture
 from relume.scene_io.surfaces.models import MODELS, SurfaceReader
-from relume.scene_io.surfaces.node_values import AUTO, NODES, NodeValues, UnsupportedNodeError
+from relume.scene_io.surfaces.node_values import AUTO, NODES, ImageNode, NodeValues, UnsupportedNodeError
 from relume.scene_io.surfaces.preview_surface import PRESENCE
 from relume.scene_io.surfaces.surface_images import SurfaceImages
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
 
 GRAY = SurfaceParameters(base_color=(0.18, 0.18, 0.18), roughness=0.5)  # of shaders that are not supported
 MATERIALX = "mtlx"  # context of outputs
-_NODES = {**IMAGE_NODES, "UsdUVTexture": partial(uv_texture, wrap="useMetadata")}
+_NODES: dict[str, ImageNode] = {**IMAGE_NODES, "UsdUVTexture": partial(uv_texture, wrap="useMetadata")}
 _CATEGORIES = sorted({*MODELS, *NODES, *IMAGE_NODES}, key=len, reverse=True)
 _TOKENS = {"presence": PRESENCE, "transparent": 0.0}  # of opacityMode
 
@@ -68,7 +68,7 @@ class UsdNode:
 
     @property
     def category(self) -> str:
-        """See `Node.category`; the identifier of other shaders."""
+        """See `ShaderNode.category`; the identifier of other shaders."""
         plain = self._identifier.removeprefix("ND_")
         known = (name for name in _CATEGORIES if plain == name or plain.startswith(f"{name}_"))
         return next(known, self._identifier)
@@ -83,7 +83,7 @@ class UsdNode:
         return str(self.shader.GetIdAttr().Get(self.time) or "")
 
     def port(self, name: str) -> UsdPort | None:
-        """See `Node.port`."""
+        """See `ShaderNode.port`."""
         usd_input = self.shader.GetInput(name)
         return UsdPort(usd_input, self.time) if usd_input else None
 
