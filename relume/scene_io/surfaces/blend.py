@@ -2,8 +2,8 @@
 
     diffuse = b (1 - m) (1 - R),  f0 = mix(s min(c f, 1), b, m),  f90 = mix(s, 1, m)
 
-for base color b, metallic m, specular s with color c and reflectance f, see `relume.scene_io.surfaces.make_material`. The
-mean reflectance R of the dielectric scales the texture if it varies, else the term.
+for base color b, metallic m, specular s with color c and reflectance f, see `make_material`. The mean reflectance R of
+the dielectric scales the texture if it varies, else the term.
 """
 
 from __future__ import annotations

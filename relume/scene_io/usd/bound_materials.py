@@ -36,7 +36,7 @@ class MaterialKey(NamedTuple):
 
     path: str = ""
     color: tuple[float, ...] | None = None
-    emission: tuple[float, ...] | None = None
+    emission: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
