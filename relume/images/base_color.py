@@ -2,7 +2,7 @@
 
 With the base color b, the metalness m, and the dielectric reflectance d at normal incidence, glTF imports compute
 
-    D = b (1 - m),  F = d (1 - m) + b m   for diffuse terms and highlights (`relume.scene_io.gltf.blend`)
+    D = b (1 - m),  F = d (1 - m) + b m   for diffuse terms and highlights (`relume.scene_io.surfaces.blend`)
 
 so b = D + F - d (1 - m), where d (1 - m)² - (D + F) (1 - m) + D = 0.
 """
@@ -23,9 +23,9 @@ from relume.images.image_store import ImageRecipe, get_recipe, load_texture
 from relume.images.read_image import limit_size
 from relume.scene.model import Material, Texture
 from relume.scene.texture_encoding import F32, F64, SRGB_TO_LINEAR, U8, encode_rows
-from relume.scene_io.gltf.blend import select_rows
-from relume.scene_io.gltf.texture_resampling import Raster, Wrap
-from relume.scene_io.gltf.to_terms import dielectric_reflectance
+from relume.scene_io.surfaces.blend import select_rows
+from relume.scene_io.surfaces.texture_resampling import Raster, Wrap
+from relume.scene_io.surfaces.to_terms import dielectric_reflectance
 
 Document = Mapping[str, Any]
 ReadMaterial = Callable[[str, str], Material]

@@ -1,6 +1,6 @@
 """Metalness images: conversion of a material's terms, as imports convert metallic maps.
 
-Metal has no diffuse reflection, and its highlight has the base color (`relume.scene_io.gltf.blend`). The image is
+Metal has no diffuse reflection, and its highlight has the base color (`relume.scene_io.surfaces.blend`). The image is
 therefore not used as a texture: two textures are computed from it and the base color, and put into the same store
 (docs/adr/0007-texture-slots-and-images.md). The blue channel is the metalness, as in glTF: linear, without the sRGB
 curve.
@@ -26,8 +26,8 @@ from relume.images.base_color import (
 from relume.images.image_store import ImageRecipe, get_record, load_texture, store_derived
 from relume.scene.model import Texture, TextureEncoding
 from relume.scene.texture_encoding import F64
-from relume.scene_io.gltf.blend import MetallicBlend
-from relume.scene_io.gltf.texture_resampling import Raster
+from relume.scene_io.surfaces.blend import MetallicBlend
+from relume.scene_io.surfaces.texture_resampling import Raster
 
 _MIN_F0 = 1e-4
 _HEAD_BYTES = 1 << 16  # of a derived image without its texels

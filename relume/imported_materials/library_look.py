@@ -15,8 +15,8 @@ from relume.images.image_store import store_texture
 from relume.images.read_image import MAX_SIDE, limit_size
 from relume.look.glass import default_glass
 from relume.scene.model import Texture
-from relume.scene_io.gltf.materials import ReadMaterial
-from relume.scene_io.gltf.uvs import UvSlot, tiling
+from relume.scene_io.surfaces.make_material import ReadMaterial
+from relume.scene_io.surfaces.uv_transforms import UvSlot, tiling
 
 
 def library_look(read: ReadMaterial, images: Path, warnings: list[ImporterWarning]) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def library_look(read: ReadMaterial, images: Path, warnings: list[ImporterWarnin
     _warn_of_surface(read, label, warnings)
     textures = dict(material.textures) | ({} if material.normal_map is None else {"normal": material.normal_map})
     used = [channel for channel in (*TEXTURES, ROUGHNESS, "normal") if channel in textures]
-    if used and tiling(read.uv_slot, UvSlot()) is None:
+    if used and tiling(read.uv_slot, UvSlot(read.uv_slot.uv_set)) is None:
         message = f"Texture coordinates of {label} are moved or scaled in the file; an object has its own."
         warnings.append(unsupported(message))
     names = {}
@@ -59,7 +59,7 @@ def _warn_of_surface(read: ReadMaterial, label: str, warnings: list[ImporterWarn
 
 def _tiled(texture: Texture, slot: UvSlot) -> Texture:
     """The texture for unscaled UV coordinates, at most `MAX_SIDE` wide and high, with three channels."""
-    pixels, layout = texture.pixels, tiling(slot, UvSlot())
+    pixels, layout = texture.pixels, tiling(slot, UvSlot(slot.uv_set))
     if pixels.shape[2] == 1:
         pixels = np.repeat(pixels, 3, axis=2)
     if layout is None or max(layout[0]) > MAX_SIDE or texture.wrap != ("repeat", "repeat"):

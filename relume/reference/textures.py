@@ -18,7 +18,7 @@ from relume.look.model import MeshLook
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Material, Mesh, Scene
-from relume.scene_io.gltf.uvs import compute_tangents
+from relume.scene.tangents import compute_tangents
 
 F32 = NDArray[np.float32]
 

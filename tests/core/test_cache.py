@@ -169,7 +169,7 @@ BOUNDED = {
     "scene/examples/interior.py",
     "scene/examples/still_life/__init__.py",
     "scene/examples/tableau.py",
-    "scene_io/gltf/sheen.py",
+    "scene_io/surfaces/sheen.py",
     "store/run_bake.py",
     "transport/outgoing_patch_light.py",
 }

@@ -19,7 +19,7 @@ from relume.methods import plan_estimates
 from relume.methods import view_stages as direct
 from relume.scene import validate
 from relume.scene_io import import_scene, referenced_files, zip_scene
-from relume.scene_io.gltf.materials import MAX_TEXTURE_TEXELS
+from relume.scene_io.surfaces.make_material import MAX_TEXTURE_TEXELS
 from relume_server.io import comment_images
 from relume_server.persistence import comment_store, look_store, share_store
 from relume_server.schemas import bodies, protocol, renders, rooms

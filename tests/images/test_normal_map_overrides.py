@@ -24,8 +24,8 @@ from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
 from relume.reference.textures import with_overrides
 from relume.scene.model import Material, Texture, TextureEncoding
+from relume.scene.tangents import compute_tangents
 from relume.scene.texture_encoding import decode
-from relume.scene_io.gltf.uvs import compute_tangents
 from relume.views import map_override_store
 
 SIDE = 64

@@ -14,7 +14,7 @@ from relume.brdf.fresnel import schlick
 from relume.core.color import srgb_decode
 from relume.scene.model import Material, Scene
 from relume.scene_io.gltf import import_gltf
-from relume.scene_io.gltf.to_terms import dielectric_reflectance
+from relume.scene_io.surfaces.to_terms import dielectric_reflectance
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 PLASTIC = {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0, "roughnessFactor": 0.5}

@@ -15,8 +15,8 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
 from relume.scene.model import Glass, Scene
 from relume.scene_io.gltf import import_gltf
-from relume.scene_io.gltf.sheen import sheen_albedo, sheen_attenuation
-from relume.scene_io.gltf.to_terms import dielectric_reflectance
+from relume.scene_io.surfaces.sheen import sheen_albedo, sheen_attenuation
+from relume.scene_io.surfaces.to_terms import dielectric_reflectance
 
 LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 PLASTIC = {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0, "roughnessFactor": 0.5}

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 import PIL.Image
 import pytest
+from environment_files import write_map
 
+from relume.brdf.evaluate import eval_brdf
 from relume.core.color import srgb_decode
 from relume.core.errors import MaterialError
 from relume.scene.model import Texture
 from relume.scene.texture_encoding import decode
-from relume.scene_io.gltf.materials import ReadMaterial
 from relume.scene_io.materialx.import_document import MaterialXDocument, import_materialx
 from relume.scene_io.referenced_files import Folder, NamedFiles
+from relume.scene_io.surfaces.make_material import ReadMaterial
 
 pytest.importorskip("MaterialX", reason="pip install relume[materialx]")
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "materialx"
@@ -422,3 +424,140 @@ def test_files_of_materialx_itself() -> None:
     honey = materials["open_pbr_honey"].material.glass
     assert honey is not None
     assert honey.absorbed == pytest.approx(-np.log([0.83, 0.4, 0.04]) / 2)
+
+
+# where the specifications decide
+
+
+def reflectance_ratio(term: dict[str, Any], cosine: float) -> Any:
+    """A highlight with its curves over the same without them, in the direction of the mirror."""
+    wo = np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
+    plain = {key: value for key, value in term.items() if key != "curves"}
+    values = [eval_brdf(each | {"texture": None}, wo * [-1, 1, 1], wo) for each in (term, plain)]
+    return values[0] / values[1]
+
+
+def test_open_pbr_metals_have_the_edge_tint_of_their_specular_color() -> None:
+    """F82-tint: tint · F at 82°, and F at normal incidence (section 3.6)."""
+    inputs = color("base_color", 0.9, 0.8, 0.7) + number("base_metalness", 1)
+    material, warnings = only(surface("open_pbr_surface", inputs + color("specular_color", 1, 0.6, 0.4)))
+    highlight = material.material.terms[1]
+    assert highlight["params"]["f0"] == [0.9, 0.8, 0.7]
+    assert reflectance_ratio(highlight, 1 / 7) == pytest.approx([1, 0.6, 0.4], abs=0.02)
+    assert reflectance_ratio(highlight, 0.999) == pytest.approx([1, 1, 1], abs=1e-3)
+    assert warnings == []
+    white = only(surface("open_pbr_surface", inputs))[0].material.terms[1]
+    assert "curves" not in white
+    _, warnings = only(surface("open_pbr_surface", inputs + number("specular_weight", 0.5)))
+    assert warnings == ["specular_weight of material “M” doesn't scale the reflection of its metallic parts."]
+
+
+def test_standard_surface_warns_of_the_edge_color_of_metals() -> None:
+    inputs = number("metalness", 1) + color("specular_color", 1, 0.5, 0.5)
+    _, warnings = only(surface("standard_surface", inputs))
+    assert warnings == ["The edge color of the metallic parts of material “M” isn't supported; it is white."]
+
+
+def test_transmitted_and_diffuse_light_have_their_own_colors() -> None:
+    """mix(base, transmission_color, weight) of two layers, as in OpenPBR and Standard Surface."""
+    inputs = color("base_color", 0.8, 0.4, 0.2) + color("transmission_color", 0.5, 1, 0.25)
+    for model, weight in (("open_pbr_surface", "transmission_weight"), ("standard_surface", "transmission")):
+        base = number("base", 1) if model == "standard_surface" else ""
+        material, warnings = only(surface(model, inputs + base + number(weight, 0.5)))
+        assert material.material.glass is not None
+        assert material.material.glass.tint == pytest.approx((0.25, 0.5, 0.125))
+        expected = np.array([0.4, 0.2, 0.1]) * (1 - F0 - (1 - F0) * RISE)
+        assert material.material.terms[0]["color"] == pytest.approx(expected, abs=1e-5)
+        assert warnings == []
+
+
+def test_preview_surface_opacity_scales_its_diffuse_color_and_keeps_the_highlight() -> None:
+    inputs = color("diffuseColor", 0.8, 0.4, 0.2) + number("ior", 1.4) + number("roughness", 0.6)
+    glass = only(surface("UsdPreviewSurface", inputs + number("opacity", 0.25)))[0].material
+    opaque = only(surface("UsdPreviewSurface", inputs))[0].material
+    assert glass.glass is not None
+    assert (glass.glass.tint, glass.glass.ior, glass.glass.roughness) == ((0.75, 0.75, 0.75), 1.4, 0)
+    assert glass.terms[0]["color"] == pytest.approx(np.array(opaque.terms[0]["color"]) / 4, abs=1e-5)
+    assert glass.terms[1] == opaque.terms[1]
+
+
+@pytest.mark.parametrize(
+    ("model", "name"),
+    [("UsdPreviewSurface", "ior"), ("standard_surface", "specular_IOR"), ("open_pbr_surface", "specular_ior")],
+)
+def test_an_index_of_refraction_out_of_range_is_that_of_glass(model: str, name: str) -> None:
+    material, warnings = only(surface(model, number(name, 0)))
+    assert material.material.terms[1]["params"]["f0"] == pytest.approx([F0] * 3)
+    assert warnings == ["The index of refraction 0 of material “M” is out of range; 1.5 is used."]
+
+
+def test_differences_of_coats_and_tangents_are_warnings() -> None:
+    inputs = number("coat", 1) + number("coat_anisotropy", 0.5) + number("coat_affect_roughness", 1)
+    inputs += number("coat_affect_color", 1) + '<input name="tangent" type="vector3" value="0, 1, 0"/>'
+    _, warnings = only(surface("standard_surface", inputs))
+    assert warnings == [
+        "tangent of material “M” isn't supported.",
+        "The coat of material “M” is approximated: its highlight is round, it doesn't blur the base, it doesn't deepen "
+        "the color of the base.",
+    ]
+    inputs = number("coat_weight", 1) + number("coat_roughness_anisotropy", 0.5) + number("coat_ior", 1.5)
+    _, warnings = only(surface("open_pbr_surface", inputs + number("coat_darkening", 0)))
+    assert warnings == ["The coat of material “M” is approximated: its highlight is round."]
+
+
+def test_rotated_texture_coordinates() -> None:
+    """place2d rotates clockwise, about the pivot: with v from the bottom u′ = v, v′ = 1 − u."""
+    nodes = '<place2d name="p" type="vector2"><input name="pivot" type="vector2" value="0.5, 0.5"/>'
+    nodes += '<input name="rotate" type="float" value="90"/></place2d>'
+    nodes += image("c", "color3", "c.png", connected("texcoord", "vector2", "p"))
+    material, warnings = only(
+        surface("gltf_pbr", connected("base_color", "color3", "c"), nodes), {"c.png": png([[[9, 9, 9]]])}
+    )
+    corners = np.array([[0, 1], [1, 1], [0.25, 0]], np.float32)  # v from the top
+    expected = np.array([[0, 0], [0, 1], [1, 0.25]])
+    np.testing.assert_allclose(material.uv_slot.apply({"st": corners}, 3), expected, atol=1e-6)
+    assert warnings == []
+
+
+def test_textures_of_usd_with_scale_and_bias() -> None:
+    nodes = (
+        '<UsdUVTexture name="t" type="multioutput"><input name="file" type="filename" value="n.png"/>'
+        '<input name="scale" type="color4" value="2, -2, 2, 1"/><input name="bias" type="color4" value="-1, 1, -1, 0"/>'
+        "</UsdUVTexture>"
+    )
+    inputs = connected("normal", "vector3", "t", "rgb") + connected("metallic", "float", "t", "b")
+    material, warnings = only(surface("UsdPreviewSurface", inputs, nodes), {"n.png": png([[[204, 102, 225]]])})
+    assert material.material.normal_map is not None
+    vector = np.array([0.6, 0.2, 225 / 127.5 - 1])
+    expected = vector / np.linalg.norm(vector)
+    np.testing.assert_allclose(texels(material.material.normal_map)[0, 0], expected, atol=0.01)
+    diffuse = texels(material.material.textures["diffuse"])[0, 0] * material.material.terms[0]["color"]
+    np.testing.assert_allclose(diffuse, [0.18 * (1 - vector[2]) * (1 - F0 - (1 - F0) * RISE)] * 3, rtol=0.02)
+    assert warnings == []
+
+
+def test_images_of_radiance_and_edges_that_are_extended(tmp_path: Path) -> None:
+    write_map(tmp_path / "c.exr", np.array([[[0.25, 0.5, 4.0]]], np.float32))
+    clamped = '<input name="uaddressmode" type="string" value="constant"/>'
+    nodes = image("c", "color3", "c.exr", clamped)
+    material, warnings = only(
+        surface("standard_surface", connected("base_color", "color3", "c") + number("base", 1), nodes),
+        {"c.exr": (tmp_path / "c.exr").read_bytes()},
+    )
+    texture = material.material.textures["diffuse"]
+    np.testing.assert_allclose(texels(texture)[0, 0], [0.25, 0.5, 1], atol=4e-3)
+    assert texture.wrap == ("clamp", "repeat")
+    assert warnings == [
+        "An image of material “M” is black outside its bounds in the file; its edge is extended.",
+        "Values of “c.exr” above 1 are clamped in textures.",
+    ]
+
+
+def test_an_image_of_a_full_coats_color_tints_the_base() -> None:
+    """The idiom of MaterialX's tiled brass: a white metal below a coat with the color of an image."""
+    nodes = image("c", "color3", "c.png", space="srgb_texture")
+    inputs = color("base_color", 0.5, 1, 1) + number("base", 1) + number("metalness", 1) + number("coat", 1)
+    inputs += connected("coat_color", "color3", "c")
+    material, _ = only(surface("standard_surface", inputs, nodes), {"c.png": png([[[255, 255, 0], [0, 255, 255]]])})
+    f0 = texels(material.material.textures["specular"]) * np.array(material.material.terms[1]["params"]["f0"])
+    np.testing.assert_allclose(f0[0], [[0.5, 1, 0], [0, 1, 1]], atol=5e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ import pytest
 from environment_files import write_map
 from glb_builder import DIELECTRIC_TRANSMISSION, QUAD_UVS, Glb
 from texture_values import get_texture_values
-from usd_text import BOUND, CHECKER, RGB, ST, WHITE, Files, imported, painted, png, quad, texture, usda
+from usd_text import BOUND, CHECKER, RGB, ST, WHITE, Files, imported, material, painted, png, quad, texture, usda
 
 from relume.core.color import srgb_decode
 from relume.scene.model import Material
 from relume.scene_io.gltf import import_gltf
+from relume.scene_io.materialx.import_document import import_materialx
+from relume.scene_io.referenced_files import NoFiles
 
 pytest.importorskip("pxr.Usd")
 
@@ -289,8 +292,8 @@ def test_what_a_shader_has_beyond_the_supported_is_one_warning_each() -> None:
     }"""
     scene = imported(usda(painted(f"{RGB}\nfloat inputs:displacement = .1", nodes)))
     assert [str(warning) for warning in scene.warnings] == [
+        "diffuseColor of material “Paint” has its default: node “Image” (Fancy) isn't supported.",
         "Displacement of material “Paint” isn't supported; its surface is smooth.",
-        "“diffuseColor” of material “Paint” comes from the node “Fancy”, which isn't supported; it has its default.",
     ]
     unknown = imported(usda(painted("").replace("UsdPreviewSurface", "Fancy")))
     assert list(unknown.warnings) == ["Material “Paint” is shown gray: its shader “Fancy” isn't supported."]
@@ -378,3 +381,102 @@ def test_documents_with_entities_are_not_read() -> None:
     assert any("Skipped “paint.mtlx”: it declares entities" in warning for warning in scene.warnings)
     wide = imported(usda(body), Files({"paint.mtlx": bomb.decode().encode("utf-16")}))
     assert any("Skipped “paint.mtlx”: the .mtlx file defines entities" in warning for warning in wide.warnings)
+
+
+def vector(name: str, value: str) -> str:
+    return number(name, value, "color3")
+
+
+SURFACES = {
+    "open_pbr_surface": number("specular_roughness_anisotropy", ".5") + number("coat_weight", ".5")
+    + vector("coat_color", "1, .5, .5") + number("coat_ior", "1.5") + number("base_metalness", ".5")
+    + vector("specular_color", ".9, .8, .7") + number("fuzz_weight", ".5") + number("subsurface_weight", ".5"),
+    "standard_surface": number("specular_anisotropy", ".5") + number("specular_rotation", ".25") + number("sheen", ".5")
+    + number("transmission", ".5") + vector("transmission_color", ".5, 1, .25") + number("base", ".5")
+    + vector("opacity", ".25, .5, .75") + number("emission", "2") + vector("emission_color", "1, .5, 0"),
+    "gltf_pbr": vector("base_color", ".9, .6, .2") + number("metallic", ".5") + number("roughness", ".25")
+    + number("alpha", ".5") + number("alpha_mode", "2", "integer") + number("clearcoat", ".7"),
+    "UsdPreviewSurface": vector("diffuseColor", ".8, .4, .2") + number("opacity", ".25") + number("ior", "1.4")
+    + number("useSpecularWorkflow", "1", "integer") + vector("specularColor", ".8, .4, .2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shader", SURFACES)
+def test_surfaces_of_usd_are_those_of_the_same_document(shader: str) -> None:
+    pytest.importorskip("MaterialX", reason="pip install relume[materialx]")
+    document = MATERIALX.format(shader=shader, inputs=SURFACES[shader]).encode()
+    (expected,) = import_materialx(document, NoFiles()).materials
+    looks = 'def Scope "Looks" (\n references = @paint.mtlx@</MaterialX/Materials>\n) {\n}'
+    body = quad(properties=f"{ST}\nrel material:binding = </Looks/Paint>", metadata=BOUND) + looks
+    (ours,) = imported(usda(body), Files({"paint.mtlx": document})).materials
+    assert ours.terms == expected.material.terms
+    if ours.glass is not None and expected.material.glass is not None:  # the quad of the stage has no depth
+        assert replace(ours.glass, thickness=0) == replace(expected.material.glass, thickness=0)
+    assert (ours.glass is None) == (expected.material.glass is None)
+    assert (ours.opacity is None) == (expected.material.opacity is None)
+    if ours.opacity is not None and expected.material.opacity is not None:
+        np.testing.assert_array_equal(ours.opacity.alpha, expected.material.opacity.alpha)
+
+
+def test_depths_of_transmission_are_in_the_unit_of_the_stage() -> None:
+    inputs = (
+        number("transmission", "1") + vector("transmission_color", ".5, 1, .25") + number("transmission_depth", "2")
+    )
+    document = MATERIALX.format(shader="standard_surface", inputs=inputs).encode()
+    looks = 'def Scope "Looks" (\n references = @paint.mtlx@</MaterialX/Materials>\n) {\n}'
+    binding = "rel material:binding = </Looks/Paint>"
+    cube = f'def Cube "C" (\n{BOUND}\n) {{\n double size = 4\n {binding}\n}}\n'
+    (ours,) = imported(usda(cube + looks, "metersPerUnit = 0.01\n"), Files({"paint.mtlx": document})).materials
+    assert ours.glass is not None
+    assert ours.glass.thickness == pytest.approx(0.04)
+    np.testing.assert_allclose(ours.glass.absorbed, [np.log(2) / 0.02, 0, np.log(4) / 0.02], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("wrap", "expected", "is_extended"),
+    [("", "clamp", True), ("useMetadata", "clamp", True), ("black", "clamp", True), ("clamp", "clamp", False),
+     ("repeat", "repeat", False), ("mirror", "mirror", False)],
+)  # fmt: skip
+def test_wrap_modes(wrap: str, expected: str, *, is_extended: bool) -> None:
+    """Without metadata of the image, `useMetadata` is black outside, and so is the default."""
+    node = texture("Image", "c.png").replace(
+        'token inputs:wrapS = "repeat"', f'token inputs:wrapS = "{wrap}"' * bool(wrap)
+    )
+    scene = imported(usda(painted(RGB, node)), Files({"c.png": CHECKER}))
+    assert scene.materials[0].textures["diffuse"].wrap == (expected, "repeat")
+    sentence = "An image of material “Paint” is black outside its bounds in the file; its edge is extended."
+    assert list(scene.warnings) == [sentence] * is_extended
+    assert all(warning.severity == "approximated" for warning in scene.warnings)
+
+
+def test_the_specular_workflow_is_no_unusual_index_of_refraction() -> None:
+    inputs = "int inputs:useSpecularWorkflow = 1\ncolor3f inputs:specularColor = (.9, .7, .3)"
+    scene = imported(usda(painted(f"{inputs}\ncolor3f inputs:diffuseColor = (0, 0, 0)")))
+    assert scene.warnings == ()
+    metal = only("color3f inputs:diffuseColor = (.9, .7, .3)\nfloat inputs:metallic = 1")
+    assert scene.materials[0].terms == metal.terms
+
+
+def test_emission_of_an_image_with_scale_and_bias() -> None:
+    emissive = "color3f inputs:emissiveColor.connect = </Paint/Image.outputs:rgb>"
+    nodes = texture("Image", "e.png", "float4 inputs:scale = (10, 10, 10, 1)\nfloat4 inputs:bias = (2, 0, 0, 0)")
+    scene = imported(usda(painted(emissive, nodes)), Files({"e.png": png([[[255, 255, 255], [0, 0, 0]]])}))
+    np.testing.assert_allclose(scene.lights[0].fields["emission"], [7, 5, 5], rtol=0.02)
+
+
+def test_display_colors_are_scaled_by_the_weight_of_the_base() -> None:
+    nodes = """
+    def Shader "Color"
+    {
+        uniform token info:id = "ND_geompropvalue_color3"
+        string inputs:geomprop = "displayColor"
+        color3f outputs:out
+    }"""
+    surface = material("color3f inputs:base_color.connect = </Paint/Color.outputs:out>\nfloat inputs:base = .5", nodes)
+    color = 'color3f[] primvars:displayColor = [(0, .5, 1)] (\n interpolation = "constant"\n)'
+    body = quad(properties=f"{color}\nrel material:binding = </Paint>", metadata=BOUND)
+    layer = body + surface.replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader")
+    scene = imported(usda(layer))
+    colors = np.array(scene.materials[0].terms[0]["color"]) / DIELECTRIC_TRANSMISSION
+    np.testing.assert_allclose(colors, [0, 0.25, 0.5], atol=1e-4)
+    assert scene.warnings == ()

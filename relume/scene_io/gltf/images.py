@@ -5,8 +5,6 @@ glTF 2.0 specification, sections 3.8 and 3.9.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
@@ -24,14 +22,6 @@ UNPACK_KTX = " (npx @gltf-transform/cli ktxdecompress in.glb out.glb)"
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
 
-class TextureSource(Protocol):
-    """Textures by index, see `ImageReader`."""
-
-    def is_usable(self, index: int, label: str) -> bool: ...
-
-    def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]: ...
-
-
 class ImageReader:
     """Decodes the images of one file, with a cache."""
 
@@ -47,20 +37,23 @@ class ImageReader:
         if index in self._unusable:
             return False
         try:
-            self.texture(index, label)
+            self.pixels(str(index), label)
+            self.wrap(index, label)
         except SceneError as problem:
             self._warnings.append(unsupported(f"An image was left out: {problem}."))
             self._unusable.add(index)
             return False
         return True
 
-    def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]:
-        """Return the RGBA bytes of a texture and its wrap modes along u and v.
+    def pixels(self, file: str, label: str) -> Shaped[U8, "height width 4"]:
+        """Return the RGBA bytes of a texture.
 
+        Args:
+            file: index of the texture. label: names it in messages.
         Raises:
             SceneError: the texture or its file is missing, too large, damaged or in an unsupported format.
         """
-        texture = self._container.document.textures.get(index, label)
+        texture = self._container.document.textures.get(int(file), label)
         webp = texture.extensions.get("EXT_texture_webp")
         sources = [webp.get("source") if isinstance(webp, dict) else None, texture.source]
         usable = [source for source in sources if isinstance(source, int)]
@@ -68,12 +61,18 @@ class ImageReader:
             formats = [name for key, name in UNREADABLE_FORMATS.items() if key in texture.extensions]
             reason = f"is in the format {formats[0]}" if formats else "has no image"
             raise SceneError(f"{label} {reason}; save it as PNG, JPEG or WebP{UNPACK_KTX if 'KTX2' in formats else ''}")
-        return self._image(usable[0], label), self._wrap(texture.sampler, label)
+        return self._image(usable[0], label)
 
-    def _wrap(self, index: int | None, label: str) -> tuple[str, str]:
-        if index is None:
+    def wrap(self, index: int, label: str) -> tuple[str, str]:
+        """Wrap modes of a texture along u and v. Raises SceneError if its sampler is invalid.
+
+        Args:
+            index: of the texture. label: names it in messages.
+        """
+        sampler_index = self._container.document.textures.get(index, label).sampler
+        if sampler_index is None:
             return "repeat", "repeat"
-        sampler = self._container.document.samplers.get(index, label)
+        sampler = self._container.document.samplers.get(sampler_index, label)
         return WRAPS.get(sampler.wrapS, "repeat"), WRAPS.get(sampler.wrapT, "repeat")
 
     def _image(self, index: int, label: str) -> U8:

@@ -16,6 +16,7 @@ from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize, no_triangles
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import Camera, Mesh, Scene
+from relume.scene.tangents import compute_tangents
 from relume.scene.textured_vertex_colors import TexturedColors, draw_textured_colors
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
@@ -32,15 +33,16 @@ from relume.scene_io.gltf.geometry import GltfGeometry, count_corners, read_prim
 from relume.scene_io.gltf.images import ImageReader
 from relume.scene_io.gltf.instances import read_instances
 from relume.scene_io.gltf.lights import LightReader
-from relume.scene_io.gltf.materials import WHITE, MaterialReader, ReadMaterial, TextureLayout, VertexColors
+from relume.scene_io.gltf.materials import MaterialReader
 from relume.scene_io.gltf.nodes import PlacedNode, place_nodes, scene_roots
 from relume.scene_io.gltf.skins import read_skins, skin_geometry
 from relume.scene_io.gltf.unknown_extensions import warn_unknown_extensions
-from relume.scene_io.gltf.uvs import compute_tangents
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
 from relume.scene_io.gltf.world_mesh import BoundPrimitive, make_world_mesh
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.referenced_files import Companions, NoFiles
+from relume.scene_io.surfaces.make_material import NO_COLORS, ReadMaterial, VertexColors
+from relume.scene_io.surfaces.material_textures import TextureLayout
 
 F64 = NDArray[np.float64]
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
@@ -264,12 +266,12 @@ class _SceneBuilder:
         """Vertex colors of a material's primitives; if they need an image, geometries get UV coordinates in it."""
         keys = self._primitives[index, choices]
         if not any("COLOR_0" in self._primitive(key).attributes for key in keys):
-            return WHITE
+            return NO_COLORS
         read = {key: self._read_geometry(key, self._document.meshes.get(key.mesh).name or "mesh") for key in keys}
         geometries = {key: geometry for key, geometry in read.items() if geometry is not None}
         vertex_colors = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
         if not vertex_colors:
-            return WHITE
+            return NO_COLORS
         white = [np.ones((1, 4), np.float32)] if len(vertex_colors) < len(geometries) else []
         colors = np.concatenate([*vertex_colors.values(), *white])
         red, green, blue, alpha = colors.mean(axis=0, dtype=np.float64).tolist()
@@ -323,7 +325,7 @@ class _SceneBuilder:
             self._geometry[key] = replace(geometries[key], uvs={0: white_uvs})
         return TexturedColors(image, WRAP)
 
-    def _read_material(self, index: int | None, colors: VertexColors = WHITE) -> ReadMaterial:
+    def _read_material(self, index: int | None, colors: VertexColors = NO_COLORS) -> ReadMaterial:
         return self._material_reader.read(self._gltf_material(index), colors)
 
     def _gltf_material(self, index: int | None) -> GltfMaterial:

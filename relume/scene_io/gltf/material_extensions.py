@@ -12,12 +12,21 @@ from pydantic import BaseModel, Field
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
-from relume.scene_io.gltf.document import Extensions, Factor, Number, TextureInfo
+from relume.scene_io.gltf.document import Extensions, Factor, Index, Number, TextureInfo
 from relume.scene_io.gltf.tolerant import read_object
 
 Color = Annotated[list[Factor], Field(min_length=3, max_length=3)]
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
 Weights = Annotated[list[Weight], Field(min_length=3, max_length=3)]
+
+
+class TextureTransform(BaseModel, frozen=True):
+    """KHR_texture_transform of one texture; `texCoord` overrides the set."""
+
+    offset: tuple[Number, Number] = (0.0, 0.0)
+    rotation: Number = 0.0
+    scale: tuple[Number, Number] = (1.0, 1.0)
+    texCoord: Index | None = None  # noqa: N815  (glTF's own spelling, here and below)
 
 
 class Ior(BaseModel, frozen=True):
@@ -29,7 +38,7 @@ class Ior(BaseModel, frozen=True):
 class Specular(BaseModel, frozen=True):
     """KHR_materials_specular: reflectance of a dielectric, and its color at normal incidence."""
 
-    specularFactor: Factor = 1.0  # noqa: N815  (glTF's own spelling, here and below)
+    specularFactor: Factor = 1.0  # noqa: N815
     specularTexture: TextureInfo | None = None  # noqa: N815
     specularColorFactor: Weights = [1.0, 1.0, 1.0]  # noqa: N815
     specularColorTexture: TextureInfo | None = None  # noqa: N815

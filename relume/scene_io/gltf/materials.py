@@ -1,152 +1,59 @@
-"""Materials of a glTF file: factors and textures of the base layer, which `to_terms` converts.
-
-With base color b, metallic m and specular s with color c: lambert has b (1 - m), the highlight has
-f0 = mix(s min(c f, 1), b, m) and f90 = mix(s, 1, m), with f from the index of refraction. glTF 2.0 specification,
-appendix B, and the specifications of the extensions.
-"""
+"""Materials of a glTF file as surface parameters. glTF 2.0 specification, section 3.9, and those of the extensions."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
-from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
-from relume.scene.opacity import make_opacity
-from relume.scene.texture_encoding import mean_value
-from relume.scene.textured_vertex_colors import TexturedColors
-from relume.scene.unique_names import unique_name
-from relume.scene.validate import MAX_IOR
-from relume.scene_io.gltf.blend import MetallicBlend, lerp
+from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import TextureInfo
-from relume.scene_io.gltf.images import TextureSource
+from relume.scene_io.gltf.images import ImageReader
 from relume.scene_io.gltf.material_dialects import translate, without_textures
-from relume.scene_io.gltf.material_extensions import Clearcoat, MaterialExtensions, read_extensions
-from relume.scene_io.gltf.texture_resampling import Raster
-from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, make_terms
-from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
+from relume.scene_io.gltf.material_extensions import MaterialExtensions, TextureTransform, read_extensions
+from relume.scene_io.gltf.tolerant import read_object
+from relume.scene_io.surfaces.make_material import NO_COLORS, ReadMaterial, SurfaceMaterials, VertexColors
+from relume.scene_io.surfaces.material_textures import TextureLayout
+from relume.scene_io.surfaces.surface_images import ImageInput
+from relume.scene_io.surfaces.surface_inputs import Color, Rgb, Scalar
+from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+from relume.scene_io.surfaces.uv_transforms import UvTransform
 
-MAX_TEXTURE_TEXELS = 700_000_000  # of all materials of a scene, 3 bytes each
-
-
-@dataclass(frozen=True)
-class VertexColors:
-    """Vertex colors of a material.
-
-    Attributes:
-        factor: RGB and alpha that multiply the base color.
-        textured: multiplies the base color texture, if there is one; None if the colors are uniform.
-    """
-
-    factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    textured: TexturedColors | None = None
-
-
-class TextureLayout(NamedTuple):
-    """Texture coordinates of a material: their slot, height and width of its largest image, and its wrap modes."""
-
-    slot: UvSlot
-    size: tuple[int, int]
-    wrap: tuple[str, str]
-
-
-@dataclass(frozen=True)
-class ReadMaterial:
-    """A material, with the UV coordinates that its meshes need.
-
-    Attributes:
-        tangent_rotation: radians, from the tangent toward the bitangent; None for an isotropic material.
-        emission: radiance, multiplied by the texture of that name.
-    """
-
-    material: Material
-    uv_slot: UvSlot
-    tangent_rotation: float | None = None
-    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-WHITE = VertexColors()
+_TRANSFORM = "KHR_texture_transform"
 
 
 class MaterialReader:
     """Converts the materials of one file, with a limit on their texels."""
 
-    def __init__(self, images: TextureSource, warnings: list[ImporterWarning]) -> None:
-        self._images = images
-        self._warnings = warnings
-        self._names: dict[str, int] = {}
-        self._remaining_texels = MAX_TEXTURE_TEXELS
-        self._occluded_materials: list[str] = []
-        self._colors: TexturedColors | None = None  # of the material that is read
-        self._usable: dict[int, tuple[GltfMaterial, GltfMaterial, MaterialExtensions]] = {}
+    def __init__(self, images: ImageReader, warnings: list[ImporterWarning]) -> None:
+        self._images, self._warnings = images, warnings
+        self._maker = SurfaceMaterials(images, warnings)
+        self._surfaces: dict[int, tuple[GltfMaterial, SurfaceParameters]] = {}
 
-    def read(self, material: GltfMaterial, colors: VertexColors = WHITE) -> ReadMaterial:
+    def read(self, material: GltfMaterial, colors: VertexColors = NO_COLORS) -> ReadMaterial:
         """Convert one material, with a unique name.
 
         Args:
             material: from the document. colors: vertex colors of its meshes.
         Raises:
-            SceneError: a texture is unusable or there are too many texels.
+            SceneError: there are too many texels.
         """
-        name = unique_name(material.name or "material", self._names)
-        label = f"material {quote(name)}"
-        material, extensions = self._usable_parts(material)
-        self._warn_unsupported(material, label)
-        infos = [info for info in _infos(material, extensions) if info is not None]
-        self._uv_transforms = UvTransforms(infos, label, self._warnings)
-        self._colors = colors.textured
-        material = _scale_base_color(material, colors.factor)
-        surface = self._surface(material, extensions, self._raster(material, extensions, label))
-        strength, tangent_rotation = self._anisotropy(extensions, label)
-        transmission = self._transmission(extensions, label)
-        glass = self._glass(surface, extensions, transmission, label) if transmission > 0 else None
-        if glass is None:
-            self._warn_unphysical_ior(extensions, label)
-        surface = replace(surface, diffuse=surface.diffuse * (1 - transmission))
-        if strength > 0 and "roughness" in surface.textures:
-            message = f"The roughness texture of {label} was replaced by its average because it is anisotropic."
-            self._warnings.append(approximated(message))
-        coat_layer = self._coat_layer(extensions, strength, label)
-        normal_map = self._normal_map(material.normalTexture, tangent_rotation, label)
-        emission_textures = self._emission_textures(material, label)
-        if coat_layer.coat > 0:
-            self._warn_coat_normals(extensions.clearcoat, label, has_normal_map=normal_map is not None)
-        scene_material = Material(
-            name,
-            make_terms(replace(surface, has_normal_map=normal_map is not None), coat_layer),
-            surface.textures | emission_textures,
-            normal_map,
-            material.doubleSided,
-            opacity=self._opacity(material, label),
-            glass=glass,
-        )
-        anisotropy_rotation = tangent_rotation if strength > 0 else None
-        has_own_uvs = self._colors is not None and self._colors.corner_uvs is not None
-        slot = UvSlot() if has_own_uvs else self._uv_transforms.slot
-        return ReadMaterial(scene_material, slot, anisotropy_rotation, self._emission(material, extensions, label))
+        return self._maker.make(material.name, self._surface(material), colors, double_sided=material.doubleSided)
 
     def texture_layout(self, material: GltfMaterial) -> TextureLayout | None:
         """Find where the textures of a material are; None if it has none that are used as images."""
-        label = f"material {quote(material.name or 'material')}"
-        material, extensions = self._usable_parts(material)
-        infos = [info for info in _infos(material, extensions) if info is not None]
-        if not infos:
-            return None
-        transforms = UvTransforms(infos, label, [])
-        loaded = [(info, *self._images.texture(info.index, f"a texture of {label}")) for info in infos]
-        shapes = [transforms.tile_image(info, pixels, wrap).shape for info, pixels, wrap in loaded]
-        size = max(height for height, *_ in shapes), max(width for _, width, *_ in shapes)
-        return TextureLayout(transforms.slot, size, loaded[0][2])
+        return self._maker.texture_layout(material.name, self._surface(material))
 
-    def _usable_parts(self, material: GltfMaterial) -> tuple[GltfMaterial, MaterialExtensions]:
-        """A material and its extensions as metallic-roughness, without the textures that cannot be read."""
-        key = id(material)
-        if key not in self._usable:
+    def warn_occlusion_maps(self) -> None:
+        """Add one warning for the occlusion textures of all materials that were read."""
+        self._maker.warn_occlusion_maps()
+
+    def _surface(self, material: GltfMaterial) -> SurfaceParameters:
+        """The parameters of a material, without the textures that cannot be read."""
+        if id(material) not in self._surfaces:
             label = f"material {quote(material.name or 'material')}"
             extensions = read_extensions(material.extensions, label, self._warnings)
             translated, extensions = translate(material, extensions, label, self._warnings)
@@ -154,260 +61,109 @@ class MaterialReader:
             def is_usable(info: TextureInfo, name: str) -> bool:
                 return name == "occlusionTexture" or self._images.is_usable(info.index, f"the {name} of {label}")
 
-            parts = without_textures(translated, is_usable), without_textures(extensions, is_usable)
-            self._usable[key] = material, *parts  # the original, too, so that its id stays its own
-        _, usable, extensions = self._usable[key]
-        return usable, extensions
+            usable = without_textures(translated, is_usable), without_textures(extensions, is_usable)
+            surface = _Textures(self._images, label, self._warnings).surface(*usable)
+            self._surfaces[id(material)] = material, surface  # the material, too, so that its id stays its own
+        return self._surfaces[id(material)][1]
 
-    def _transmission(self, extensions: MaterialExtensions, label: str) -> float:
+
+class _Textures:
+    """The textures of one material as images."""
+
+    def __init__(self, images: ImageReader, label: str, warnings: list[ImporterWarning]) -> None:
+        self._images, self._label, self._warnings = images, label, warnings
+        self._transforms: dict[int, tuple[int, UvTransform]] = {}
+
+    def surface(self, material: GltfMaterial, extensions: MaterialExtensions) -> SurfaceParameters:
+        """The parameters of a material whose textures can be used."""
+        pbr, specular, coat = material.pbrMetallicRoughness, extensions.specular, extensions.clearcoat
+        tinted, sheen, fuzz = extensions.coat, extensions.sheen, extensions.fuzz
+        anisotropy, volume, glossy = extensions.anisotropy, extensions.volume, extensions.pbrSpecularGlossiness
         transmission = extensions.transmission
-        return transmission.transmissionFactor * self._mean(
-            transmission.transmissionTexture, 0, f"transmission texture of {label}"
+        roughness = self._number(pbr.roughnessFactor, pbr.metallicRoughnessTexture, "g")
+        if glossy is not None:
+            roughness = self._roughness(glossy.glossinessFactor, glossy.specularGlossinessTexture)
+        return SurfaceParameters(
+            base_color=self._color(pbr.baseColorFactor, pbr.baseColorTexture),
+            metallic=self._number(pbr.metallicFactor, pbr.metallicRoughnessTexture, "b"),
+            roughness=roughness,
+            specular=self._number(specular.specularFactor, specular.specularTexture, "a"),
+            specular_color=self._color(specular.specularColorFactor, specular.specularColorTexture),
+            ior=extensions.ior.ior,
+            has_f0=glossy is not None,
+            anisotropy=anisotropy.anisotropyStrength,
+            anisotropy_rotation=anisotropy.anisotropyRotation,
+            anisotropy_map=self._image(anisotropy.anisotropyTexture),
+            clearcoat=self._number(coat.clearcoatFactor, coat.clearcoatTexture, "r"),
+            clearcoat_roughness=self._number(coat.clearcoatRoughnessFactor, coat.clearcoatRoughnessTexture, "g"),
+            clearcoat_ior=1.5 if tinted is None else tinted.coatIor,
+            clearcoat_color=(
+                (1.0, 1.0, 1.0) if tinted is None else self._color(tinted.coatColorFactor, tinted.coatColorTexture)
+            ),
+            has_clearcoat_normal=coat.clearcoatNormalTexture is not None,
+            sheen_color=self._color(sheen.sheenColorFactor, sheen.sheenColorTexture),
+            sheen_weight=1.0 if fuzz is None else self._number(1.0, fuzz.fuzzTexture, "r"),
+            sheen_roughness=self._number(sheen.sheenRoughnessFactor, sheen.sheenRoughnessTexture, "a"),
+            transmission=self._number(transmission.transmissionFactor, transmission.transmissionTexture, "r"),
+            thickness=volume.thicknessFactor,
+            attenuation_distance=volume.attenuationDistance,
+            attenuation_color=_rgb(volume.attenuationColor),
+            emission=self._color(np.maximum(material.emissiveFactor, 0).tolist(), material.emissiveTexture),
+            emission_strength=extensions.emissive_strength.emissiveStrength,
+            alpha=self._number(pbr.baseColorFactor[3], pbr.baseColorTexture, "a"),
+            alpha_mode=material.alphaMode,
+            alpha_cutoff=material.alphaCutoff,
+            normal=self._normal(material.normalTexture),
+            has_occlusion=material.occlusionTexture is not None,
         )
 
-    def _glass(self, surface: PbrSurface, extensions: MaterialExtensions, transmission: float, label: str) -> Glass:
-        """Thin or solid glass: tinted by the base color, and absorbing inside a solid."""
-        volume, ior = extensions.volume, extensions.ior.ior
-        if not 1 <= ior <= MAX_IOR:
-            message = f"The index of refraction {ior:g} of {label} is out of range; 1.5 is used."
-            self._warnings.append(unsupported(message))
-            ior = 1.5
-        tint = surface.diffuse * transmission
-        if "diffuse" in surface.textures:
-            tint = tint * mean_value(surface.textures["diffuse"])
-        absorbed = -np.log(np.maximum(volume.attenuationColor, 1e-6)) / volume.attenuationDistance
-        red, green, blue = np.clip(tint, 0, 1).tolist()
-        r, g, b = absorbed.tolist() if volume.thicknessFactor > 0 else (0.0, 0.0, 0.0)
-        return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b), surface.roughness)
-
-    def _warn_coat_normals(self, coat: Clearcoat, label: str, *, has_normal_map: bool) -> None:
-        """Warn if the coat has other normals than the base layer; a view sample has one normal for both."""
-        has_coat_normals = coat.clearcoatNormalTexture is not None
-        if has_normal_map or has_coat_normals:
-            appearance = "follows the base normal map" if has_normal_map else "is smooth"
-            original = "it has its own normal map" if has_coat_normals else "it is smooth"
-            self._warnings.append(approximated(f"Clearcoat on {label} {appearance}; in the file {original}."))
-
-    def _warn_unphysical_ior(self, extensions: MaterialExtensions, label: str) -> None:
-        """Warn about an index of refraction that no opaque material has, unless it means a mirror."""
-        ior, specular = extensions.ior.ior, extensions.specular
-        reflectance = min(1.0, _f0(ior) * max(specular.specularColorFactor)) * specular.specularFactor
-        if extensions.pbrSpecularGlossiness is not None:  # f0 is the color, whatever the index
-            return
-        if 0 < ior < 1 or reflectance > _f0(MAX_IOR):
-            message = f"Unusual index of refraction {ior:g} on {label} (default 1.5): non-metallic parts reflect"
-            self._warnings.append(unsupported(f"{message} {reflectance:.0%} of the light at normal incidence."))
-
-    def _opacity(self, material: GltfMaterial, label: str) -> Opacity | None:
-        """Opacity of a material; alpha is ignored in other alpha modes."""
-        if material.alphaMode not in ("MASK", "BLEND"):
-            if material.alphaMode != "OPAQUE":
-                message = f"The alpha mode {quote(material.alphaMode)} of {label} isn't supported; it is shown opaque."
-                self._warnings.append(unsupported(message))
-            return None
-        pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
-        if (base := self._base_image(material, label)) is not None:
-            alpha, wrap = base[0][..., 3], base[1]
-        cutoff = material.alphaCutoff if material.alphaMode == "MASK" else None
-        return make_opacity(alpha, wrap, pbr.baseColorFactor[3], cutoff, label, self._warnings)
-
-    def _emission(
-        self, material: GltfMaterial, extensions: MaterialExtensions, label: str
-    ) -> tuple[float, float, float]:
-        factor = np.maximum(material.emissiveFactor, 0) * extensions.emissive_strength.emissiveStrength
-        red, green, blue = factor.tolist()
-        return red, green, blue
-
-    def _emission_textures(self, material: GltfMaterial, label: str) -> dict[str, Texture]:
-        """The emission texture as it is in the file."""
-        if material.emissiveTexture is None or max(material.emissiveFactor) <= 0:
-            return {}
-        pixels, wrap = self._load_image(material.emissiveTexture, f"the emission texture of {label}")
-        return {
-            "emission": self._count_texels(
-                Texture(np.ascontiguousarray(pixels[..., :3]), wrap, TextureEncoding("srgb"))
-            )
-        }
-
-    def _surface(self, material: GltfMaterial, extensions: MaterialExtensions, raster: Raster) -> PbrSurface:
-        """The base layer, with textures only if their values vary."""
-        pbr, specular = material.pbrMetallicRoughness, extensions.specular
-        factor = np.array(pbr.baseColorFactor[:3])
-        dielectric = _f0(extensions.ior.ior) * np.array(specular.specularColorFactor)
-        roughness = raster.mean("packed", 1) * pbr.roughnessFactor
-        blend = MetallicBlend(raster, factor, dielectric, pbr.metallicFactor, specular.specularFactor)
-        specular_reflectance = 0.0 if blend.reflectance_varies else blend.mean_reflectance()
-        if raster.empty:
-            metallic, weight = pbr.metallicFactor, specular.specularFactor
-            f0 = lerp(weight * np.minimum(dielectric, 1), factor, metallic)
-            return PbrSurface(factor * (1 - metallic), f0, lerp(weight, 1, metallic), roughness, specular_reflectance)
-        textures = {"diffuse": self._count_texels(blend.diffuse())}
-        if roughness > 0 and raster.varies("packed", 1):
-            textures["roughness"] = self._count_texels(_normalize_roughness(raster))
-        lowest, highest, mean_f0, f90 = blend.f0_and_f90()
-        if (highest - lowest).max() < 1e-6:
-            return PbrSurface(factor, lowest, f90, roughness, specular_reflectance, textures)
-        mean_f0 = np.maximum(mean_f0, 1e-4)
-        textures["specular"] = self._count_texels(blend.normalized_f0(mean_f0, highest))
-        return PbrSurface(factor, mean_f0, f90, roughness, specular_reflectance, textures)
-
-    def _base_image(self, material: GltfMaterial, label: str) -> tuple[NDArray[np.uint8], tuple[str, str]] | None:
-        """The base color texture times vertex colors, with its wrap modes; None if both are uniform."""
-        info = material.pbrMetallicRoughness.baseColorTexture
-        image = None if info is None else self._load_image(info, f"the base color texture of {label}")
-        if self._colors is None:
-            return image
-        return self._colors.image if image is None else self._colors.multiply(image[0]), self._colors.wrap
-
-    def _raster(self, material: GltfMaterial, extensions: MaterialExtensions, label: str) -> Raster:
-        """The textures of the base layer, resampled to the size of the first."""
-        pbr, base = material.pbrMetallicRoughness, self._base_image(material, label)
-        infos = {
-            "packed": (pbr.metallicRoughnessTexture, "metallic-roughness"),
-            "specular": (extensions.specular.specularTexture, "specular"),
-            "tint": (extensions.specular.specularColorTexture, "specular color"),
-        }
-        images = {} if base is None else {"base": base}
-        images |= {
-            key: self._load_image(info, f"the {texture_name} texture of {label}")
-            for key, (info, texture_name) in infos.items()
-            if info is not None
-        }
-        glossy = extensions.pbrSpecularGlossiness
-        if glossy is not None and "tint" in images:
-            images["packed"] = _invert_glossiness(images["tint"][0], glossy.glossinessFactor), images["tint"][1]
-        tiled = {key: info for key, (info, _) in infos.items()} | {"base": pbr.baseColorTexture}
-        tiled_shapes = [
-            images[key][0].shape for key, info in tiled.items() if info and self._uv_transforms.is_tiled(info)
-        ]
-        return Raster(
-            images, (max((h for h, _, _ in tiled_shapes), default=0), max((w for _, w, _ in tiled_shapes), default=0))
-        )
-
-    def _coat_layer(self, extensions: MaterialExtensions, anisotropy: float, label: str) -> CoatLayer:
-        coat, sheen = extensions.clearcoat, extensions.sheen
-        weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"clearcoat texture of {label}")
-        coat_roughness = coat.clearcoatRoughnessFactor
-        if coat.clearcoatRoughnessTexture is not None:
-            coat_roughness *= self._mean(coat.clearcoatRoughnessTexture, 1, f"clearcoat roughness texture of {label}")
-        sheen_roughness = sheen.sheenRoughnessFactor
-        if sheen.sheenRoughnessTexture is not None:
-            sheen_roughness *= self._mean(sheen.sheenRoughnessTexture, 3, f"sheen roughness texture of {label}")
-        fuzz_weight = self._mean(extensions.fuzz.fuzzTexture, 0, f"fuzz texture of {label}") if extensions.fuzz else 1.0
-        tint = (
-            fuzz_weight
-            * np.array(sheen.sheenColorFactor)
-            * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {label}")
-        )
-        r, g, b = (round(float(value), 6) for value in tint)
-        if r + g + b > 0:
-            self._warnings.append(approximated(f"Energy loss under the sheen of {label} is approximated."))
-        layer = CoatLayer(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
-        if extensions.coat is None:
-            return layer
-        color = self._mean_color(extensions.coat.coatColorTexture, f"coat color texture of {label}")
-        red, green, blue = lerp(1.0, color * extensions.coat.coatColorFactor, layer.coat).tolist()
-        return replace(layer, coat_f0=_f0(extensions.coat.coatIor), coat_color=(red, green, blue))
-
-    def _anisotropy(self, extensions: MaterialExtensions, label: str) -> tuple[float, float]:
-        """Strength, and angle from the tangent to the anisotropy direction in radians; (0, 0) if isotropic."""
-        anisotropy = extensions.anisotropy
-        strength, rotation = anisotropy.anisotropyStrength, anisotropy.anisotropyRotation
-        if anisotropy.anisotropyTexture is not None and strength > 0:
-            pixels, _ = self._images.texture(anisotropy.anisotropyTexture.index, f"the anisotropy texture of {label}")
-            x, y = (pixels[..., :2].mean((0, 1), dtype=np.float64) / 127.5 - 1).tolist()
-            strength *= float(pixels[..., 2].mean()) / 255
-            rotation += float(np.arctan2(y, x))
-            if np.hypot(x, y) < 0.5:
-                message = f"The anisotropy texture of {label} has no main direction; its highlight is round."
-                self._warnings.append(approximated(message))
-                return 0.0, 0.0
-            if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
-                self._warnings.append(approximated(f"The anisotropy texture of {label} was replaced by its average."))
-        if strength == 0:
-            return 0.0, 0.0
-        message = f"The anisotropic highlight of {label} is approximated (Ashikhmin-Shirley, similar width)."
-        self._warnings.append(approximated(message))
-        return strength, float(np.remainder(rotation, 2 * np.pi))
-
-    def _normal_map(self, info: TextureInfo | None, tangent_rotation: float, label: str) -> Texture | None:
-        """The normal map as a texture, in tangent frames that are rotated by `tangent_rotation`."""
+    def _image(
+        self, info: TextureInfo | None, channel: str = "rgb", factor: Rgb = (1.0, 1.0, 1.0), *, is_srgb: bool = False
+    ) -> ImageInput | None:
         if info is None:
             return None
-        pixels, wrap = self._load_image(info, f"the normal texture of {label}")
-        scale = float(np.clip(info.scale, -100, 100))
-        encoding = TextureEncoding("normal", (scale, scale, 1.0), tangent_rotation)
-        return self._count_texels(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, encoding))
+        uv_set, transform = self._placement(info)
+        wrap = self._images.wrap(info.index, self._label)
+        return ImageInput(str(info.index), channel, is_srgb, factor, wrap=wrap, uv_set=uv_set, transform=transform)
 
-    def _load_image(self, info: TextureInfo, label: str) -> tuple[NDArray[np.uint8], tuple[str, str]]:
-        """Load a texture, tiled for the UV coordinates of the meshes, with its wrap modes."""
-        pixels, wrap = self._images.texture(info.index, label)
-        pixels = self._uv_transforms.tile_image(info, pixels, wrap)
-        return (pixels, wrap) if self._colors is None else self._colors.place(pixels, wrap)
+    def _number(self, factor: float, info: TextureInfo | None, channel: str) -> Scalar:
+        image = self._image(info, channel, (factor, factor, factor))
+        return factor if image is None else image
 
-    def _mean(self, info: TextureInfo | None, channel: int, label: str) -> float:
-        """Mean of one channel in [0, 1], with a warning if it varies; 1 without a texture."""
-        if info is None:
-            return 1.0
-        pixels, _ = self._images.texture(info.index, f"the {label}")
-        if np.ptp(pixels[..., channel]) > 2:
-            self._warnings.append(approximated(f"The {label} was replaced by its average."))
-        return float(pixels[..., channel].mean()) / 255
+    def _color(self, factor: Sequence[float], info: TextureInfo | None) -> Color:
+        image = self._image(info, "rgb", _rgb(factor), is_srgb=True)
+        return _rgb(factor) if image is None else image
 
-    def _mean_color(self, info: TextureInfo | None, label: str) -> Any:
-        if info is None:
-            return np.ones(3)
-        pixels, _ = self._images.texture(info.index, f"the {label}")
-        if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
-            self._warnings.append(approximated(f"The {label} was replaced by its average."))
-        return mean_value(Texture(pixels[..., :3], encoding=TextureEncoding("srgb")))
+    def _roughness(self, glossiness: float, info: TextureInfo | None) -> Scalar:
+        """Roughness of 1 − glossiness."""
+        image = self._image(info, "a", (-glossiness, -glossiness, -glossiness))
+        return 1 - glossiness if image is None else replace(image, bias=(1.0, 1.0, 1.0))
 
-    def _count_texels(self, texture: Texture) -> Texture:
-        self._remaining_texels -= texture.pixels.size // 3
-        if self._remaining_texels < 0:
-            raise SceneError(f"the scene's textures have more than {MAX_TEXTURE_TEXELS:,} texels; scale them down")
-        return texture
+    def _normal(self, info: TextureInfo | None) -> ImageInput | None:
+        """Vectors 2 t − 1 of texels t, with x and y scaled."""
+        scale = 1.0 if info is None else info.scale
+        image = self._image(info, "rgb", (2 * scale, 2 * scale, 2.0))
+        return None if image is None else replace(image, bias=(-scale, -scale, -1.0))
 
-    def _warn_unsupported(self, material: GltfMaterial, label: str) -> None:
-        if material.occlusionTexture is not None:
-            self._occluded_materials.append(label)
+    def _placement(self, info: TextureInfo) -> tuple[int, UvTransform]:
+        """UV set and transform of a texture."""
+        if id(info) not in self._transforms:
+            self._transforms[id(info)] = self._read_placement(info)
+        return self._transforms[id(info)]
 
-    def warn_occlusion_maps(self) -> None:
-        """Add one warning for the occlusion textures of all materials that were read."""
-        num_materials = len(self._occluded_materials)
-        if num_materials:
-            materials = self._occluded_materials[0] if num_materials == 1 else f"{num_materials} materials"
-            self._warnings.append(ignored(f"AO maps ignored on {materials}: occlusion is ray-traced."))
+    def _read_placement(self, info: TextureInfo) -> tuple[int, UvTransform]:
+        extension = info.extensions.get(_TRANSFORM)
+        if extension is None:
+            return info.texCoord, UvTransform()
+        try:
+            read = read_object(TextureTransform, extension, f"a texture transform of {self._label}", self._warnings)
+        except SceneError as problem:
+            self._warnings.append(unsupported(f"Ignored a texture transform: {problem}."))
+            return info.texCoord, UvTransform()
+        uv_set = info.texCoord if read.texCoord is None else read.texCoord
+        return uv_set, UvTransform(read.offset, read.rotation, read.scale)
 
 
-def _infos(material: GltfMaterial, extensions: MaterialExtensions) -> list[TextureInfo | None]:
-    """Textures that are used as images, the most important first."""
-    pbr, specular = material.pbrMetallicRoughness, extensions.specular
-    images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
-    return [*images, specular.specularTexture, specular.specularColorTexture, material.emissiveTexture]
-
-
-def _scale_base_color(material: GltfMaterial, factor: tuple[float, float, float, float]) -> GltfMaterial:
-    """Multiply the base color of a material."""
-    pbr = material.pbrMetallicRoughness
-    scaled = [component * scale for component, scale in zip(pbr.baseColorFactor, factor, strict=True)]
-    return material.model_copy(update={"pbrMetallicRoughness": pbr.model_copy(update={"baseColorFactor": scaled})})
-
-
-def _normalize_roughness(raster: Raster) -> Texture:
-    """Roughness texture over its mean."""
-    scale = 1 / raster.mean("packed", 1)
-    pixels = np.ascontiguousarray(raster.channel("packed", 1))
-    return Texture(pixels, raster.wrap, TextureEncoding("share", (scale, scale, scale)))
-
-
-def _invert_glossiness(pixels: NDArray[np.uint8], factor: float) -> NDArray[np.uint8]:
-    """A roughness image in the green channel, from glossiness in the alpha channel."""
-    packed = pixels.copy()
-    packed[..., 1] = np.rint(255 - factor * pixels[..., 3].astype(np.float64))
-    return packed
-
-
-def _f0(ior: float) -> float:
-    """Reflectance of a dielectric at normal incidence; an index of 0 means a mirror, as in the extension."""
-    return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2
+def _rgb(numbers: Sequence[float]) -> Rgb:
+    red, green, blue = numbers[:3]
+    return red, green, blue

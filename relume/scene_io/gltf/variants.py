@@ -19,8 +19,8 @@ from relume.scene.model import F32, Texture
 from relume.scene.texture_encoding import F64, decode_rows, mean_value
 from relume.scene.unique_names import unique_name
 from relume.scene_io.gltf.document import Document, Extensions, Index, Name, Primitive
-from relume.scene_io.gltf.materials import ReadMaterial
 from relume.scene_io.gltf.tolerant import read_object
+from relume.scene_io.surfaces.make_material import ReadMaterial
 
 EXTENSION = "KHR_materials_variants"
 SAME_IMAGE = 0.01  # relative RMS; different compressions of an image differ by less

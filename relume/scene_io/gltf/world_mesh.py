@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.scene.model import F32, Mesh
+from relume.scene.tangents import compute_tangents, rotate_tangents
 from relume.scene_io.gltf.degenerate_transforms import (
     cofactors,
     determinant,
@@ -16,8 +17,7 @@ from relume.scene_io.gltf.degenerate_transforms import (
     remove_degenerate,
 )
 from relume.scene_io.gltf.geometry import MAX_COORDINATE, GltfGeometry
-from relume.scene_io.gltf.materials import ReadMaterial
-from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
+from relume.scene_io.surfaces.make_material import ReadMaterial
 
 F64 = NDArray[np.float64]
 

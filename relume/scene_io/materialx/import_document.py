@@ -1,4 +1,4 @@
-"""Import of MaterialX documents: surfaces whose inputs are constants and images, see `node_values`.
+"""Import of MaterialX documents: surfaces whose inputs are constants and images.
 
 Documents are upgraded to version 1.39 by the library MaterialX, an optional dependency. Other files than images in the
 document's folder, archive or upload are never read.
@@ -12,29 +12,17 @@ from typing import Any
 
 from relume.core.errors import MaterialError
 from relume.core.import_warnings import ImporterWarning, ignored, quote, unsupported
-from relume.scene_io.gltf.materials import ReadMaterial
-from relume.scene_io.materialx.image_nodes import IMAGE_NODES
-from relume.scene_io.materialx.node_values import TOO_COMPLEX, Element, NodeValues, UnsupportedNodeError
+from relume.scene_io.materialx.document_nodes import DocumentPort, Element
 from relume.scene_io.materialx.safe_xml import check_xml
-from relume.scene_io.obj_ply.material_maker import read_companion
+from relume.scene_io.obj_ply.material_maker import printable, read_companion
 from relume.scene_io.referenced_files import Companions
-from relume.scene_io.surfaces.gltf_pbr import gltf_pbr
-from relume.scene_io.surfaces.make_material import SurfaceMaterials
-from relume.scene_io.surfaces.open_pbr import open_pbr
-from relume.scene_io.surfaces.preview_surface import preview_surface
-from relume.scene_io.surfaces.standard_surface import standard_surface
-from relume.scene_io.surfaces.surface_images import SurfaceImages
-from relume.scene_io.surfaces.surface_inputs import SurfaceInputs, Value
+from relume.scene_io.surfaces.image_nodes import IMAGE_NODES
+from relume.scene_io.surfaces.make_material import ReadMaterial, SurfaceMaterials
+from relume.scene_io.surfaces.models import MODELS, SurfaceReader
+from relume.scene_io.surfaces.node_values import NodeValues
+from relume.scene_io.surfaces.surface_images import SurfaceImages, first_tile
 
-MODELS = {
-    "open_pbr_surface": open_pbr,
-    "standard_surface": standard_surface,
-    "gltf_pbr": gltf_pbr,
-    "UsdPreviewSurface": preview_surface,
-}
 MAX_MATERIALS = 200
-_NORMALS = ("normal", "geometry_normal")
-_UNUSED = ("tangent", "geometry_tangent", "coat_normal", "geometry_coat_normal", "geometry_coat_tangent")
 
 
 @dataclass(frozen=True)
@@ -64,15 +52,17 @@ def import_materialx(data: bytes, companions: Companions) -> MaterialXDocument:
         for name in check_xml(data)
     ]
     document = _parse(data)
-    images = SurfaceImages(lambda name, label: read_companion(companions, "", name, label, warnings), warnings)
-    values, maker = NodeValues(IMAGE_NODES, warnings), SurfaceMaterials(images, warnings)
+    images = SurfaceImages(_DocumentImages(companions, warnings), warnings)
+    reader, maker = (
+        SurfaceReader(NodeValues(IMAGE_NODES, warnings), images, warnings),
+        SurfaceMaterials(images, warnings),
+    )
     materials = list[ReadMaterial]()
     for name, shader in _surfaces(document, warnings):
         if len(materials) == MAX_MATERIALS:
             raise MaterialError(f"the .mtlx file has more than {MAX_MATERIALS} materials; split it")
-        label = f"material {quote(name)}"
-        inputs = SurfaceInputs(_input_values(shader, values, label, warnings), images, label, warnings)
-        materials.append(maker.make(name, MODELS[shader.getCategory()](inputs)))
+        ports = [(port.getName(), DocumentPort(port)) for port in shader.getInputs()]
+        materials.append(maker.make(name, reader.read(shader.getCategory(), ports, f"material {quote(name)}")))
     maker.warn_occlusion_maps()
     if not materials:
         reasons = " ".join(warnings)
@@ -80,6 +70,22 @@ def import_materialx(data: bytes, companions: Companions) -> MaterialXDocument:
             f"the .mtlx file has no material that can be shown; give one of {', '.join(MODELS)}. {reasons}".strip()
         )
     return MaterialXDocument(tuple(materials), tuple(warnings))
+
+
+@dataclass(frozen=True)
+class _DocumentImages:
+    """Images of a document, relative to it."""
+
+    companions: Companions
+    warnings: list[ImporterWarning]
+
+    def read(self, file: str, label: str) -> bytes | None:
+        """See `DocumentFiles.read`."""
+        return read_companion(self.companions, "", first_tile(file, self.warnings), label, self.warnings)
+
+    def printable_name(self, file: str) -> str:
+        """See `DocumentFiles.printable_name`."""
+        return printable(file)
 
 
 def _parse(data: bytes) -> Any:
@@ -123,21 +129,3 @@ def _surfaces(document: Any, warnings: list[ImporterWarning]) -> Iterator[tuple[
 def _connected(material: Element, name: str) -> Element | None:
     port = material.getInput(name)
     return None if port is None else port.getConnectedNode()
-
-
-def _input_values(shader: Element, values: NodeValues, label: str, warnings: list[ImporterWarning]) -> dict[str, Value]:
-    """The values of a shader's inputs; those that cannot be read are left out, with a warning."""
-    results = dict[str, Value]()
-    for port in shader.getInputs():
-        name = port.getName()
-        try:
-            value = values.value(port)
-        except (UnsupportedNodeError, RecursionError) as error:
-            reason = TOO_COMPLEX if isinstance(error, RecursionError) else error
-            warnings.append(unsupported(f"{name} of {label} has its default: {reason}."))
-            continue
-        if value is not None and name in _UNUSED:
-            warnings.append(unsupported(f"{name} of {label} isn't supported."))
-        elif value is not None:
-            results[name] = value
-    return results

@@ -21,7 +21,6 @@ from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, Textu
 from relume.scene.unique_names import unique_name
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.cameras import framing_camera
-from relume.scene_io.gltf.uvs import UvSlot
 from relume.scene_io.import_options import Recenter
 from relume.scene_io.obj_ply.material_maker import MaterialMaker, emission_factor, read_companion, textured
 from relume.scene_io.obj_ply.mtl import read_library
@@ -34,6 +33,7 @@ from relume.scene_io.obj_ply.text import counted
 from relume.scene_io.obj_ply.weld import Corners, make_mesh, used_rows
 from relume.scene_io.placement import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
+from relume.scene_io.surfaces.uv_transforms import UvSlot
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]

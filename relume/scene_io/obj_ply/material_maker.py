@@ -16,9 +16,6 @@ from relume.image_io.decode import U8, Decoder
 from relume.scene.model import Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 from relume.scene.unique_names import unique_name
-from relume.scene_io.gltf.document import TextureInfo
-from relume.scene_io.gltf.texture_resampling import NOISE
-from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
 from relume.scene_io.obj_ply.mtl import NORMAL_MAP_KEYWORDS, USED_MAPS
 from relume.scene_io.obj_ply.mtl_dialects import (
     Gloss,
@@ -30,6 +27,8 @@ from relume.scene_io.obj_ply.mtl_dialects import (
     make_mtl_terms,
 )
 from relume.scene_io.referenced_files import Companions
+from relume.scene_io.surfaces.texture_resampling import NOISE
+from relume.scene_io.surfaces.uv_transforms import UvSlot, UvTransform, UvTransforms
 
 F64 = NDArray[np.float64]
 MAX_STRENGTH = 100.0
@@ -170,8 +169,8 @@ class _Images:
             if mtl_map.name
         }
         self._pixels = {keyword: pixels for keyword, pixels in decoded.items() if pixels is not None}
-        self._infos = {keyword: texture_info(named[keyword]) for keyword in self._pixels}
-        self._transforms = UvTransforms([*self._infos.values()], label, maker._warnings)
+        self._slots = {keyword: uv_slot(named[keyword]) for keyword in self._pixels}
+        self._transforms = UvTransforms([*self._slots.values()], label, maker._warnings)
         self.slot = self._transforms.slot
 
     def wrap(self, keyword: str) -> tuple[str, str]:
@@ -183,7 +182,7 @@ class _Images:
         """RGBA pixels for the common UV coordinates. (height, width, 4)"""
         if keyword not in self._pixels:
             return None
-        return self._transforms.tile_image(self._infos[keyword], self._pixels[keyword], self.wrap(keyword))
+        return self._transforms.tile_image(self._slots[keyword], self._pixels[keyword], self.wrap(keyword))
 
     def scalars(self, keyword: str) -> Shaped[U8, "height width"] | None:
         """One channel of an image: that of -imfchan, for opacity an alpha channel that varies, otherwise red."""
@@ -206,11 +205,10 @@ def _without_black(mtl_material: MtlMaterial, textures: dict[str, Texture]) -> M
     return replace(mtl_material, numbers={keyword: values for keyword, values in numbers.items() if keyword != "Kd"})
 
 
-def texture_info(mtl_map: MtlMap) -> TextureInfo:
-    """The options of an image as in glTF, whose v runs from the top: v′ = s v + (1 − s − o)."""
+def uv_slot(mtl_map: MtlMap) -> UvSlot:
+    """The options of an image for v from the top: v′ = s v + (1 − s − o)."""
     (u_scale, v_scale), (u_offset, v_offset) = mtl_map.scale, mtl_map.offset
-    transform = {"scale": [u_scale, v_scale], "offset": [u_offset, 1 - v_scale - v_offset]}
-    return TextureInfo(index=0, extensions={"KHR_texture_transform": transform})
+    return UvSlot(transform=UvTransform((u_offset, 1 - v_scale - v_offset), scale=(u_scale, v_scale)))
 
 
 def read_companion(

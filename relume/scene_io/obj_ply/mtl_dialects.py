@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from relume.brdf.registry import TERMS
 from relume.scene.model import Glass, Texture
 from relume.scene.validate import MAX_IOR
-from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, Terms, dielectric_reflectance, make_terms
+from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface, Terms, dielectric_reflectance, make_terms
 
 F64 = NDArray[np.float64]
 GRAY = [0.6, 0.6, 0.6]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.core.numba_options import NO_REFCOUNT
 from relume.scene.model import F32, Material, Mesh
+from relume.scene.tangents import compute_tangents
 from relume.scene_io.gltf.geometry import MAX_COORDINATE, find_nondegenerate, is_usable
-from relume.scene_io.gltf.uvs import compute_tangents
 from relume.scene_io.obj_ply.text import counted
 
 F64 = NDArray[np.float64]

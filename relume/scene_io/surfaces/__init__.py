@@ -1,5 +1,6 @@
-"""Surface models of other formats as materials: OpenPBR, Standard Surface, glTF PBR and UsdPreviewSurface.
+"""Surface models as materials: OpenPBR, Standard Surface, glTF PBR and UsdPreviewSurface; and glTF's materials.
 
-A model's inputs are constants and images (`surface_inputs`). Each model converts them to `surface_parameters`, which
-are those of glTF with its extensions, and `make_material` makes a material of these.
+`node_values` reads networks of MaterialX and USD into constants and images (`surface_inputs`). Each of the `models`
+converts them to `surface_parameters`, which are those of glTF with its extensions; `make_material`, to read first,
+makes a material of these, and `to_terms` its terms.
 """

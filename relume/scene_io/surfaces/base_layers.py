@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf
+from typing import Any
 
+from relume.scene.validate import MAX_IOR
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_inputs import Color, Rgb, Scalar, SurfaceInputs, lerp, scaled
-from relume.scene_io.surfaces.surface_parameters import from_microfacet_widths
+from relume.scene_io.surfaces.surface_inputs import Color, Scalar, SurfaceInputs, lerp, scaled
+from relume.scene_io.surfaces.surface_parameters import BLACK, WHITE, from_microfacet_widths
 
-WHITE: Rgb = (1.0, 1.0, 1.0)
 _COAT_IOR = 1.5  # of the term
 _VISIBLE_IOR_DIFFERENCE = 0.02
+MAX_EMISSION = 1e9
+
+
+def read_ior(inputs: SurfaceInputs, name: str) -> float:
+    """An index of refraction; 1.5 with a warning if no dielectric has it.
+
+    Args:
+        inputs: of the surface. name: of the input.
+    """
+    ior = inputs.number(name, 1.5, inf)
+    if 0 < ior <= MAX_IOR:
+        return ior
+    inputs.warn_unsupported(f"The index of refraction {ior:g} of {inputs.label} is out of range; 1.5 is used.")
+    return 1.5
 
 
 def subsurface_base(inputs: SurfaceInputs, base: Color, weight: float, subsurface: Color) -> Color:
@@ -29,39 +43,34 @@ def subsurface_base(inputs: SurfaceInputs, base: Color, weight: float, subsurfac
     return subsurface if weight >= 0.5 else base
 
 
-def transmissive_base(inputs: SurfaceInputs, base: Color, weight: float, tint: Color) -> Color:
-    """The base color of a surface with transmission: glTF has one color for both parts.
-
-    Args:
-        inputs: get the warning. base: color of the diffuse part. weight: of the transmission. tint: its color.
-    """
-    if weight == 0 or base == tint:
-        return base
-    if weight < 1:
-        inputs.warn_approximated(f"Diffuse reflection and transmission of {inputs.label} have a common color.")
-    if isinstance(base, tuple) and isinstance(tint, tuple):
-        return lerp(base, tint, weight)
-    return tint if weight >= 0.5 else base
-
-
-def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, *, darkens: bool = False) -> Rgb:
+def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, **differences: bool) -> Color:
     """The factor of the layers below a coat that absorbs light; all approximations of the coat are one warning.
 
     Args:
         inputs: with the transmittance `coat_color`. weight: of the coat. ior: its index of refraction.
-        darkens: reflections between coat and base darken the base.
+        differences: names of effects on the coat or below it, and whether the document has them.
     """
     if not isinstance(weight, ImageInput) and weight == 0:
         return WHITE
-    color = inputs.constant_color("coat_color", WHITE)
+    color = inputs.color("coat_color", WHITE)
     ignored = [f"its index of refraction {ior:g} is shown as {_COAT_IOR}"] * (
         abs(ior - _COAT_IOR) > _VISIBLE_IOR_DIFFERENCE
     )
-    ignored += ["it doesn't darken the base"] * darkens
+    ignored += [_COAT_DIFFERENCES[name] for name, applies in differences.items() if applies]
     ignored += ["it is tinted the same from all sides"] * (color != WHITE)
     if ignored:
         inputs.warn_approximated(f"The coat of {inputs.label} is approximated: {', '.join(ignored)}.")
-    return WHITE if color == WHITE else lerp(WHITE, color, inputs.mean("the coat", weight)[0])
+    if color == WHITE or weight == 1:
+        return color
+    return lerp(WHITE, inputs.mean("coat_color", color), inputs.mean("the coat", weight)[0])
+
+
+_COAT_DIFFERENCES = {
+    "darkens": "it doesn't darken the base",
+    "is_anisotropic": "its highlight is round",
+    "blurs": "it doesn't blur the base",
+    "deepens": "it doesn't deepen the color of the base",
+}
 
 
 def warn_rough_diffuse(inputs: SurfaceInputs, roughness: float) -> None:
@@ -70,53 +79,54 @@ def warn_rough_diffuse(inputs: SurfaceInputs, roughness: float) -> None:
         inputs.warn_approximated(f"Rough diffuse reflection of {inputs.label} is shown as Lambert's.")
 
 
-def tinted(color: Color, tint: Rgb) -> Color:
-    """A color below a tinted coat."""
-    return color if tint == WHITE else scaled(color, tint)
+def warn_thin_film(inputs: SurfaceInputs, weight: float) -> None:
+    """Warn if the highlight has interference colors."""
+    if weight > 0:
+        message = f"Iridescence on {inputs.label} isn't supported; its highlight has no interference colors."
+        inputs.warn_unsupported(message)
 
 
-@dataclass(frozen=True)
-class TransmissionLayer:
-    """Transmission of a surface.
+def warn_dispersion(inputs: SurfaceInputs, transmission: Scalar, dispersion: float) -> None:
+    """Warn if transmitted light is dispersed.
 
-    Attributes:
-        weight: fraction of the light that is transmitted.
-        depth: the inside transmits `inside` over this distance; infinite if it is clear.
-        tint: transmittance of the surface. inside: of the inside.
-        thickness: of a solid, for formats without a thickness; 0 of a thin wall.
+    Args:
+        inputs: get the warning. transmission: weight of the transmitted light. dispersion: 0 for none.
     """
+    if transmission != 0 and dispersion > 0:
+        inputs.warn_unsupported(f"Dispersion on {inputs.label} isn't supported; it refracts all colors alike.")
 
-    weight: Scalar
-    depth: float
-    tint: Color
-    inside: Rgb
-    thickness: float
 
-    @staticmethod
-    def read(inputs: SurfaceInputs, weight_name: str, thin_name: str) -> TransmissionLayer:
-        """Read the inputs that OpenPBR and Standard Surface share.
+def tinted(inputs: SurfaceInputs, color: Color, tint: Color) -> Color:
+    """A color below a tinted coat; of two images, the mean of the tint.
 
-        Args:
-            inputs: of the surface. weight_name, thin_name: their names of the weight and of thin walls.
-        """
-        weight = inputs.scalar(weight_name, 0.0)
-        if weight == 0:
-            return TransmissionLayer(0.0, inf, WHITE, WHITE, 0.0)
-        if any(inputs.constant_color("transmission_scatter", (0.0, 0.0, 0.0))):
-            inputs.warn_unsupported(f"Scattering inside {inputs.label} isn't supported; it is shown clear.")
-        depth = inputs.number("transmission_depth", 0.0, 1e6)
-        thickness = 0.0 if inputs.number(thin_name, 0.0) > 0 else depth or 1.0
-        if depth == 0:
-            return TransmissionLayer(weight, inf, inputs.color("transmission_color", WHITE), WHITE, thickness)
-        return TransmissionLayer(weight, depth, WHITE, inputs.constant_color("transmission_color", WHITE), thickness)
+    Args:
+        inputs: get the warning. color: the color. tint: of the coat.
+    """
+    if tint == WHITE:
+        return color
+    if isinstance(tint, ImageInput) and not isinstance(color, ImageInput):
+        return scaled(tint, color)
+    return scaled(color, inputs.mean("coat_color", tint))
 
-    def base(self, inputs: SurfaceInputs, weight_name: str, base: Color) -> Color:
-        """The base color in glTF. See `transmissive_base`."""
-        return (
-            base
-            if self.weight == 0
-            else transmissive_base(inputs, base, inputs.mean(weight_name, self.weight)[0], self.tint)
-        )
+
+def transmission_layer(inputs: SurfaceInputs, weight_name: str, thin_name: str, tint: Color) -> dict[str, Any]:
+    """The parameters of transmission, from the inputs that OpenPBR and Standard Surface share.
+
+    Args:
+        inputs: of the surface. weight_name, thin_name: their names of the weight and of thin walls.
+        tint: of the coat.
+    """
+    weight = inputs.scalar(weight_name, 0.0)
+    if weight == 0:
+        return {}
+    if any(inputs.constant_color("transmission_scatter", BLACK)):
+        inputs.warn_unsupported(f"Scattering inside {inputs.label} isn't supported; it is shown clear.")
+    depth = inputs.number("transmission_depth", 0.0, 1e6)
+    layer = {"transmission": weight, "thickness": 0.0 if inputs.number(thin_name, 0.0) > 0 else depth or 1.0}
+    if depth == 0:
+        return {**layer, "transmission_color": tinted(inputs, inputs.color("transmission_color", WHITE), tint)}
+    inside = inputs.constant_color("transmission_color", WHITE)
+    return {**layer, "transmission_color": tint, "attenuation_distance": depth, "attenuation_color": inside}
 
 
 def anisotropic_highlight(

@@ -5,18 +5,19 @@ from __future__ import annotations
 from math import sqrt
 
 from relume.scene_io.surfaces.base_layers import (
-    WHITE,
-    TransmissionLayer,
+    MAX_EMISSION,
     anisotropic_highlight,
     coat_tint,
+    read_ior,
     subsurface_base,
     tinted,
+    transmission_layer,
+    warn_dispersion,
     warn_rough_diffuse,
+    warn_thin_film,
 )
 from relume.scene_io.surfaces.surface_inputs import SurfaceInputs
-from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
-
-_MAX_LUMINANCE = 1e9
+from relume.scene_io.surfaces.surface_parameters import WHITE, SurfaceParameters
 
 
 def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
@@ -29,36 +30,43 @@ def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
     )
     warn_rough_diffuse(inputs, inputs.number("base_diffuse_roughness", 0))
     coat = inputs.scalar("coat_weight", 0)
-    is_darkened = inputs.number("coat_darkening", 1) > 0
-    tint = coat_tint(inputs, coat, inputs.number("coat_ior", 1.6, 10), darkens=is_darkened)
-    transmission = TransmissionLayer.read(inputs, "transmission_weight", "geometry_thin_walled")
-    base = transmission.base(inputs, "transmission_weight", base)
+    tint = coat_tint(
+        inputs,
+        coat,
+        inputs.number("coat_ior", 1.6, 10),
+        darkens=inputs.number("coat_darkening", 1) > 0,
+        is_anisotropic=inputs.number("coat_roughness_anisotropy", 0) > 0,
+    )
+    transmission = transmission_layer(inputs, "transmission_weight", "geometry_thin_walled", tint)
+    warn_dispersion(inputs, transmission.get("transmission", 0), inputs.number("transmission_dispersion_scale", 0))
+    warn_thin_film(inputs, inputs.number("thin_film_weight", 0))
+    metallic = inputs.scalar("base_metalness", 0)
+    specular = inputs.scalar("specular_weight", 1)
+    if metallic != 0 and specular != 1:
+        inputs.warn_approximated(
+            f"specular_weight of {inputs.label} doesn't scale the reflection of its metallic parts."
+        )
     roughness, anisotropy = anisotropic_highlight(inputs, 0.3, "specular_roughness_anisotropy", _widths)
     return SurfaceParameters(
-        base_color=tinted(base, tint),
-        metallic=inputs.scalar("base_metalness", 0),
+        base_color=tinted(inputs, base, tint),
+        metallic=metallic,
         roughness=roughness,
-        specular=inputs.scalar("specular_weight", 1),
-        specular_color=tinted(inputs.color("specular_color", WHITE), tint),
-        ior=inputs.number("specular_ior", 1.5, 10),
+        specular=specular,
+        specular_color=tinted(inputs, inputs.color("specular_color", WHITE), tint),
+        edge_tint=WHITE if metallic == 0 else inputs.constant_color("specular_color", WHITE),
+        ior=read_ior(inputs, "specular_ior"),
         anisotropy=anisotropy,
         clearcoat=coat,
         clearcoat_roughness=inputs.scalar("coat_roughness", 0),
-        sheen_color=inputs.weighted_color(
-            "fuzz_weight", inputs.scalar("fuzz_weight", 0), inputs.color("fuzz_color", WHITE)
-        ),
+        sheen_color=inputs.color("fuzz_color", WHITE),
+        sheen_weight=inputs.scalar("fuzz_weight", 0),
         sheen_roughness=inputs.scalar("fuzz_roughness", 0.5),
-        transmission=transmission.weight,
-        thickness=transmission.thickness,
-        attenuation_distance=transmission.depth,
-        attenuation_color=transmission.inside,
         emission=inputs.color("emission_color", WHITE),
-        emission_strength=inputs.number("emission_luminance", 0, _MAX_LUMINANCE),
+        emission_strength=inputs.number("emission_luminance", 0, MAX_EMISSION),
         alpha=inputs.scalar("geometry_opacity", 1),
         alpha_mode="BLEND",
         normal=inputs.normal("geometry_normal"),
-        iridescence=inputs.number("thin_film_weight", 0),
-        dispersion=inputs.number("transmission_dispersion_scale", 0) if transmission.weight else 0.0,
+        **transmission,
     )
 
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 from math import inf, pi, sqrt
 
 from relume.scene_io.surfaces.base_layers import (
-    WHITE,
-    TransmissionLayer,
+    MAX_EMISSION,
     anisotropic_highlight,
     coat_tint,
+    read_ior,
     subsurface_base,
     tinted,
+    transmission_layer,
+    warn_dispersion,
     warn_rough_diffuse,
+    warn_thin_film,
 )
 from relume.scene_io.surfaces.surface_inputs import SurfaceInputs
-from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
-
-_MAX_EMISSION = 1e9
+from relume.scene_io.surfaces.surface_parameters import WHITE, SurfaceParameters
 
 
 def standard_surface(inputs: SurfaceInputs) -> SurfaceParameters:
@@ -25,34 +26,43 @@ def standard_surface(inputs: SurfaceInputs) -> SurfaceParameters:
     base = subsurface_base(inputs, base, inputs.number("subsurface", 0), inputs.color("subsurface_color", WHITE))
     warn_rough_diffuse(inputs, inputs.number("diffuse_roughness", 0))
     coat = inputs.scalar("coat", 0)
-    tint = coat_tint(inputs, coat, inputs.number("coat_IOR", 1.5, 10))
-    transmission = TransmissionLayer.read(inputs, "transmission", "thin_walled")
-    base = transmission.base(inputs, "transmission", base)
+    tint = coat_tint(
+        inputs,
+        coat,
+        inputs.number("coat_IOR", 1.5, 10),
+        is_anisotropic=inputs.number("coat_anisotropy", 0) > 0,
+        blurs=inputs.number("coat_affect_roughness", 0) > 0,
+        deepens=inputs.number("coat_affect_color", 0) > 0,
+    )
+    transmission = transmission_layer(inputs, "transmission", "thin_walled", tint)
+    warn_dispersion(inputs, transmission.get("transmission", 0), inputs.number("transmission_dispersion", 0, inf))
+    warn_thin_film(inputs, inputs.number("thin_film_thickness", 0, inf))
+    metallic = inputs.scalar("metalness", 0)
+    if metallic != 0 and (inputs.scalar("specular", 1) != 1 or inputs.color("specular_color", WHITE) != WHITE):
+        inputs.warn_approximated(
+            f"The edge color of the metallic parts of {inputs.label} isn't supported; it is white."
+        )
     roughness, anisotropy = anisotropic_highlight(inputs, 0.2, "specular_anisotropy", _widths)
     return SurfaceParameters(
-        base_color=tinted(base, tint),
-        metallic=inputs.scalar("metalness", 0),
+        base_color=tinted(inputs, base, tint),
+        metallic=metallic,
         roughness=roughness,
         specular=inputs.scalar("specular", 1),
-        specular_color=tinted(inputs.color("specular_color", WHITE), tint),
-        ior=inputs.number("specular_IOR", 1.5, 10),
+        specular_color=tinted(inputs, inputs.color("specular_color", WHITE), tint),
+        ior=read_ior(inputs, "specular_IOR"),
         anisotropy=anisotropy,
         anisotropy_rotation=2 * pi * inputs.number("specular_rotation", 0),
         clearcoat=coat,
         clearcoat_roughness=inputs.scalar("coat_roughness", 0.1),
-        sheen_color=inputs.weighted_color("sheen", inputs.scalar("sheen", 0), inputs.color("sheen_color", WHITE)),
+        sheen_color=inputs.color("sheen_color", WHITE),
+        sheen_weight=inputs.scalar("sheen", 0),
         sheen_roughness=inputs.scalar("sheen_roughness", 0.3),
-        transmission=transmission.weight,
-        thickness=transmission.thickness,
-        attenuation_distance=transmission.depth,
-        attenuation_color=transmission.inside,
         emission=inputs.color("emission_color", WHITE),
-        emission_strength=inputs.number("emission", 0, _MAX_EMISSION),
+        emission_strength=inputs.number("emission", 0, MAX_EMISSION),
         alpha=inputs.scalar("opacity", 1),
         alpha_mode="BLEND",
         normal=inputs.normal("normal"),
-        iridescence=float(inputs.number("thin_film_thickness", 0, inf) > 0),
-        dispersion=inputs.number("transmission_dispersion", 0, inf) if transmission.weight else 0.0,
+        **transmission,
     )
 
 

@@ -14,6 +14,7 @@ Rgb = tuple[float, float, float]
 Scalar = float | ImageInput
 Color = Rgb | ImageInput
 Value = float | Rgb | ImageInput
+_ONE: Rgb = (1.0, 1.0, 1.0)
 
 
 class SurfaceInputs:
@@ -45,11 +46,15 @@ class SurfaceInputs:
             name: of the input. default: of the model. maximum: larger constants are clamped, with a warning.
         """
         value = self._value(name, default, maximum)
+        if isinstance(value, ImageInput):
+            return replace(value, is_srgb=value.is_srgb is not False)
         return (value, value, value) if isinstance(value, float) else value
 
     def scalar(self, name: str, default: float, maximum: float = 1.0) -> Scalar:
         """A number, at least 0; of a color the mean. Arguments as in `color`: name, default, maximum."""
         value = self._value(name, default, maximum)
+        if isinstance(value, ImageInput):
+            return replace(_first_channel(value), is_srgb=bool(value.is_srgb))
         return float(np.mean(value)) if isinstance(value, tuple) else value
 
     def number(self, name: str, default: float, maximum: float = 1.0) -> float:
@@ -65,11 +70,11 @@ class SurfaceInputs:
         return isinstance(self._values.get(name), ImageInput)
 
     def normal(self, name: str) -> ImageInput | None:
-        """A normal map, times its scale in the factor; None without one."""
+        """A normal map, whose values are vectors; None without one."""
         value = self._values.get(name)
         if not isinstance(value, ImageInput) or self._images.pixels(value.file, self._describe(name)) is None:
             return None
-        return value
+        return replace(value, is_srgb=bool(value.is_srgb))
 
     def mean(self, name: str, value: Value) -> Rgb:
         """Three equal numbers of a number; a color; the mean of an image, with a warning.
@@ -117,14 +122,48 @@ class SurfaceInputs:
         return f"image of {name} of {self.label}"
 
 
+def channel(value: Value, name: str) -> Value:
+    """One channel of a color.
+
+    Args:
+        value: the color. name: "r", "g", "b" or "a".
+    """
+    if isinstance(value, ImageInput):
+        if name == value.channel:
+            return value
+        index = "rgba".index(name)
+        factor, bias, default = (_repeated(row, index) for row in (value.factor, value.bias, value.default))
+        return replace(value, channel=name, factor=factor or _ONE, bias=bias or (0.0, 0.0, 0.0), default=default)
+    if isinstance(value, tuple):
+        return value["rgb".index(name)] if name != "a" else 1.0
+    return value
+
+
+def _first_channel(image: ImageInput) -> ImageInput:
+    first = channel(image, image.channel[0])
+    assert isinstance(first, ImageInput)
+    return first
+
+
 def scaled(color: Color, factor: Rgb) -> Color:
     """Multiply a color by another."""
-    values = color.factor if isinstance(color, ImageInput) else color
-    red, green, blue = (np.array(values) * factor).tolist()
-    return replace(color, factor=(red, green, blue)) if isinstance(color, ImageInput) else (red, green, blue)
+    if not isinstance(color, ImageInput):
+        return _product(color, factor)
+    default = None if color.default is None else _product(color.default, factor)
+    return replace(color, factor=_product(color.factor, factor), bias=_product(color.bias, factor), default=default)
 
 
 def lerp(a: Rgb, b: Rgb, weight: float) -> Rgb:
     """Interpolate colors linearly, from a at weight 0 to b at weight 1."""
     red, green, blue = (np.array(a) * (1 - weight) + np.array(b) * weight).tolist()
     return red, green, blue
+
+
+def _product(a: Rgb, b: Rgb) -> Rgb:
+    red, green, blue = (np.array(a) * b).tolist()
+    return red, green, blue
+
+
+def _repeated(numbers: Rgb | None, index: int) -> Rgb | None:
+    """One of three numbers, for all channels; None of what has no alpha."""
+    return None if numbers is None or index > 2 else (numbers[index],) * 3

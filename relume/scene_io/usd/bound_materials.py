@@ -11,20 +11,19 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
-from relume.scene.model import F32, Glass
+from relume.scene.model import F32
 from relume.scene.textured_vertex_colors import TexturedColors
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
-from relume.scene_io.gltf.materials import MaterialReader, ReadMaterial, VertexColors
-from relume.scene_io.usd.images import UsdImages
-from relume.scene_io.usd.networks import PrimvarReference
+from relume.scene_io.surfaces.make_material import NO_COLORS, ReadMaterial, SurfaceMaterials, VertexColors
+from relume.scene_io.surfaces.surface_images import SurfaceImages
+from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+from relume.scene_io.usd.networks import UsdSurfaceReader
 from relume.scene_io.usd.polygon_mesh import COLOR, OPACITY, PrimTriangles, Primvar
-from relume.scene_io.usd.shaders import ShaderReader
-from relume.scene_io.usd.surface import Surface, SurfaceConverter
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 GRAY = (0.5, 0.5, 0.5, 1.0)  # of prims without material and color
-UNBOUND = Surface(base_color=PrimvarReference(COLOR))
+UNBOUND = SurfaceParameters(has_mesh_colors=True, roughness=0.5, alpha_mode="BLEND")
 
 
 class MaterialKey(NamedTuple):
@@ -37,7 +36,7 @@ class MaterialKey(NamedTuple):
 
     path: str = ""
     color: tuple[float, ...] | None = None
-    emission: tuple[float, ...] | None = None
+    emission: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -58,27 +57,34 @@ class UsdMaterialReader:
     """Reads the materials of one stage; each gets a unique name."""
 
     def __init__(
-        self, stage: Any, time: Any, meters: float, images: UsdImages, warnings: list[ImporterWarning]
+        self, stage: Any, time: Any, meters: float, images: SurfaceImages, warnings: list[ImporterWarning]
     ) -> None:
-        self._stage, self._time, self._meters = stage, time, meters
-        self._images, self._warnings = images, warnings
-        self._reader = MaterialReader(images, warnings)
+        self._stage, self._meters, self._warnings = stage, meters, warnings
+        self._reader = UsdSurfaceReader(time, images, warnings)
+        self._maker = SurfaceMaterials(images, warnings)
 
-    def surface(self, key: MaterialKey, name: str) -> tuple[str, Surface]:
-        """Read the name and the shader of a material. name: for prims without one."""
+    def surface(self, key: MaterialKey, name: str) -> tuple[str, SurfaceParameters]:
+        """Read the name and the surface of a material. name: for prims without one."""
         from pxr import UsdShade
 
         surface = UNBOUND
         if key.path:
             material = UsdShade.Material(self._stage.GetPrimAtPath(key.path))
             name = material.GetPrim().GetName()
-            surface = ShaderReader(self._time, self._meters, f"material {quote(name)}", self._warnings).read(material)
+            surface = self._reader.read(material, f"material {quote(name)}")
+            surface = replace(surface, attenuation_distance=surface.attenuation_distance * self._meters)
         if key.emission is not None:
-            surface = replace(surface, emission=key.emission, emission_scale=1.0)
+            surface = replace(surface, emission=key.emission, emission_strength=1.0)
         return name, surface
 
     def read(
-        self, name: str, surface: Surface, shapes: Sequence[PrimTriangles], thickness: float, *, double_sided: bool
+        self,
+        name: str,
+        surface: SurfaceParameters,
+        shapes: Sequence[PrimTriangles],
+        thickness: float,
+        *,
+        double_sided: bool,
     ) -> UsdMaterial:
         """Make a material.
 
@@ -86,23 +92,15 @@ class UsdMaterialReader:
             name, surface: from `surface`. shapes: all triangles that have it. thickness: of the solids that it bounds,
                 meters. double_sided: whether a prim shows both sides.
         """
-        label = f"material {quote(name)}"
-        converter = SurfaceConverter(self._images, label, self._warnings)
-        gltf_material = converter.convert(surface, name, thickness, double_sided=double_sided)
-        colors, color_uvs = VertexColors(), dict[int, F32]()
-        if surface.uses_display_color:
-            colors, color_uvs = self._colors(shapes, label, has_textures=bool(converter.uv_names))
-            if colors.factor[3] < 1 or colors.textured is not None:
-                gltf_material = gltf_material.model_copy(update={"alphaMode": "BLEND"})
-        read_material = self._reader.read(gltf_material, colors)
-        if surface.transparency > 0:
-            # light passes with its color, and the highlight stays
-            passed = (surface.transparency,) * 3
-            glass = Glass(passed, float(np.clip(surface.ior, 1, 4)))
-            read_material = replace(read_material, material=replace(read_material.material, glass=glass))
-        set_number = read_material.uv_slot.uv_set
-        uv_name = converter.uv_names[set_number] if set_number < len(converter.uv_names) else None
-        return UsdMaterial(read_material, uv_name, color_uvs)
+        colors, color_uvs = NO_COLORS, dict[int, F32]()
+        if surface.has_mesh_colors:
+            has_textures = self._maker.texture_layout(name, surface) is not None
+            colors, color_uvs = self._colors(shapes, f"material {quote(name)}", has_textures=has_textures)
+        if surface.thickness > 0:
+            surface = replace(surface, thickness=thickness)
+        read_material = self._maker.make(name, surface, colors, double_sided=double_sided)
+        uv_set = read_material.uv_slot.uv_set
+        return UsdMaterial(read_material, uv_set if isinstance(uv_set, str) else None, color_uvs)
 
     def _colors(
         self, shapes: Sequence[PrimTriangles], label: str, *, has_textures: bool
@@ -127,7 +125,7 @@ class UsdMaterialReader:
 
     def warn_occlusion_maps(self) -> None:
         """Add one warning for the occlusion textures of all materials that were read."""
-        self._reader.warn_occlusion_maps()
+        self._maker.warn_occlusion_maps()
 
 
 def bound_material(prim: Any, warnings: list[ImporterWarning]) -> str:

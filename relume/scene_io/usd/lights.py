@@ -19,7 +19,7 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
 from relume.scene.validate import MAX_EMISSION, MAX_METERS
-from relume.scene_io.usd.images import UsdImages
+from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -51,7 +51,12 @@ class UsdLightReader:
     """
 
     def __init__(
-        self, time: Any, meters: float, images: UsdImages, collector: LightCollector, warnings: list[ImporterWarning]
+        self,
+        time: Any,
+        meters: float,
+        images: SurfaceImages,
+        collector: LightCollector,
+        warnings: list[ImporterWarning],
     ) -> None:
         self._time, self._meters, self._images = time, meters, images
         self._collector, self._warnings = collector, warnings
@@ -181,7 +186,10 @@ class UsdLightReader:
         if not path or not path.path:
             return np.ones(3)
         self._warnings.append(approximated(f"The texture of {label} was replaced by its average."))
-        return self._images.mean_color(path.path, f"the texture of {label}")
+        label = f"texture of {label}"
+        if self._images.pixels(path.path, label) is None:
+            return np.ones(3)
+        return self._images.mean(ImageInput(path.path, is_srgb=True), label)
 
     def _warn_links(self, prim: Any, label: str) -> None:
         from pxr import UsdLux
@@ -203,7 +211,7 @@ class UsdLightReader:
             return
         emitted, name = radiance(prim, self._time), prim.GetName()[:80] or "dome"
         path = prim.GetAttribute("inputs:texture:file").Get(self._time)
-        data = self._images.read(path.path) if path and path.path else None
+        data = self._images.files.read(path.path, label) if path and path.path else None
         uniform = Environment(name, np.ones((*UNIFORM_SIZE, 3), np.float32))
         try:
             image = uniform if data is None else read_environment(data, name)

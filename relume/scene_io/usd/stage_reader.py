@@ -22,15 +22,17 @@ from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize, no_triangles
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import Camera, Mesh, Scene
+from relume.scene.tangents import compute_tangents, rotate_tangents
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
 from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.gltf.degenerate_transforms import cofactors, determinant
-from relume.scene_io.gltf.uvs import compute_tangents, rotate_tangents
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply.weld import Corners, make_mesh
 from relume.scene_io.placement import TO_Y_UP, choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
+from relume.scene_io.surfaces.surface_images import SurfaceImages
+from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
 from relume.scene_io.usd.bound_materials import (
     MaterialKey,
     UsdMaterial,
@@ -39,17 +41,15 @@ from relume.scene_io.usd.bound_materials import (
     display_colors,
 )
 from relume.scene_io.usd.cameras import read_camera
-from relume.scene_io.usd.images import UsdImages
+from relume.scene_io.usd.images import LayerImages
 from relume.scene_io.usd.instances import instance_transforms
 from relume.scene_io.usd.layers import INSTALL, LayerFolder
 from relume.scene_io.usd.lights import KINDS, UsdLightReader, radiance
 from relume.scene_io.usd.meshes import MeshReader
-from relume.scene_io.usd.networks import Numbers
 from relume.scene_io.usd.polygon_mesh import NORMALS, PrimTriangles, Primvar, make_triangles
 from relume.scene_io.usd.primvars import read_primvars
 from relume.scene_io.usd.shapes import shape_mesh
 from relume.scene_io.usd.skinning import bake_skinning
-from relume.scene_io.usd.surface import Surface
 
 F64 = NDArray[np.float64]
 MAX_PRIMS = 1_000_000
@@ -122,7 +122,7 @@ class _StageReader:
         self._time = Usd.TimeCode(stage.GetStartTimeCode()) if has_range else Usd.TimeCode.EarliestTime()
         bake_skinning(stage, self._time, warnings)
         self._transforms = UsdGeom.XformCache(self._time)
-        self._images = UsdImages(layers, warnings)
+        self._images = SurfaceImages(LayerImages(layers, warnings), warnings)
         self._mesh_reader = MeshReader(self._time, warnings)
         self._triangles: dict[str, PrimTriangles | None] = {}
         self._parts: dict[tuple[str, MaterialKey], list[tuple[str, PrimTriangles, MaterialKey]]] = {}
@@ -329,8 +329,8 @@ class _StageReader:
 
     def _materials_and_meshes(self, meters: float, origin: F64) -> tuple[list[UsdMaterial], list[Mesh]]:
         reader = UsdMaterialReader(self._stage, self._time, meters, self._images, self._warnings)
-        surfaces: dict[MaterialKey, tuple[str, Surface]] = {}
-        groups: dict[tuple[str, Surface, Numbers | None], list[_Shape]] = {}
+        surfaces: dict[MaterialKey, tuple[str, SurfaceParameters]] = {}
+        groups: dict[tuple[str, SurfaceParameters, tuple[float, ...] | None], list[_Shape]] = {}
         for shape in self._shapes:
             if shape.key not in surfaces:
                 surfaces[shape.key] = reader.surface(shape.key, shape.name)
@@ -399,8 +399,7 @@ class _StageReader:
                 return none
             primvar = candidates[other]
         uvs = np.column_stack([primvar.values[:, 0], 1 - primvar.values[:, 1]]).astype(np.float32)
-        slot = replace(material.read_material.uv_slot, uv_set=0)
-        return slot.apply({0: uvs}, len(uvs)).astype(np.float64), primvar.index
+        return material.read_material.uv_slot.apply({material.uv_name: uvs}, len(uvs)).astype(np.float64), primvar.index
 
     def _lights_and_cameras(self, lights: UsdLightReader, origin: F64) -> list[Camera]:
         from pxr import UsdGeom

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,10 +24,11 @@ from relume.brdf.term import Term
 from relume.brdf.texture_slots import ROUGHNESS
 from relume.math.angle_bands import band_averages
 from relume.scene.model import Texture
-from relume.scene_io.gltf.sheen import sheen_attenuation, sheen_term
+from relume.scene_io.surfaces.sheen import sheen_attenuation, sheen_term
 
 F64 = NDArray[np.float64]
 COAT_F0 = 0.04
+_COS_82 = 1 / 7
 _MEAN_RISE = 0.0036845  # mean of (1 - cos θd)^5 over both hemispheres, cosine-weighted
 Terms = tuple[dict[str, Any], ...]
 Reflectance = TypeVar("Reflectance", float, NDArray[np.float32])
@@ -41,6 +43,7 @@ class PbrSurface:
         roughness: perceptual, α = roughness².
         specular_reflectance: mean specular reflectance of the dielectric, which reduces its diffuse reflection.
         textures: multipliers of the two terms, and of the roughness.
+        edge_loss: coefficient a of the reflectance F - a cos θd (1 - cos θd)⁶, see `f82_coefficient`.
         has_normal_map: minification increases the roughness, see `relume.scene.roughness_levels`.
     """
 
@@ -50,6 +53,7 @@ class PbrSurface:
     roughness: float
     specular_reflectance: float = 0.0
     textures: dict[str, Texture] = field(default_factory=dict)
+    edge_loss: Shaped[F64, " 3"] = field(default_factory=lambda: np.zeros(3))
     has_normal_map: bool = False
 
 
@@ -79,7 +83,7 @@ def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
             "color": _round_color(surface.diffuse * (1 - surface.specular_reflectance)),
             "texture": textures["diffuse"],
         },
-        _highlight(surface, coat_layer.anisotropy) | {"texture": textures["specular"]},
+        _with_edge_tint(_highlight(surface, coat_layer.anisotropy), surface) | {"texture": textures["specular"]},
     ]
     if any(coat_layer.sheen):
         layers = [_attenuate_below_sheen(layer, coat_layer) for layer in layers]
@@ -94,6 +98,38 @@ def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
         ]
         layers.append({"model": "ggx", "color": [coat_layer.coat] * 3, "params": params, "texture": None})
     return tuple(layers)
+
+
+def f82_coefficient(f0: Shaped[F64, " 3"], tint: Shaped[F64, " 3"]) -> Shaped[F64, " 3"]:
+    """Coefficient a of Schlick's F minus a cos θ (1 - cos θ)⁶, which is tint F at cos θ = 1/7 (82°).
+
+    Kutz et al. 2021, "Novel aspects of the Adobe Standard Material", and OpenPBR Surface 1.1, section 3.6.
+
+    Args:
+        f0: of a metal. tint: in [0, 1].
+    """
+    return np.asarray(schlick(np.array(_COS_82), f0) * (1 - tint) / _edge(_COS_82))
+
+
+def _edge(cosine: Any) -> Any:
+    return cosine * (1 - cosine) ** 6
+
+
+def _with_edge_tint(layer: dict[str, Any], surface: PbrSurface) -> dict[str, Any]:
+    """A highlight times the reflectance with an edge tint over Schlick's, for each color channel."""
+    if not surface.edge_loss.any():
+        return layer
+
+    def relative(theta: F64, f0: float, loss: float) -> F64:
+        cosine = np.cos(theta)
+        reflectance = f0 + (surface.f90 - f0) * (1 - cosine) ** 5
+        return np.asarray(np.clip(1 - loss * _edge(cosine) / np.maximum(reflectance, 1e-6), 0, 1))
+
+    num_bands, curves = TERMS[layer["model"]].curve("theta_d").num_bands, list[dict[str, Any]]()
+    for channel, f0, loss in zip("rgb", surface.f0.tolist(), surface.edge_loss.tolist(), strict=True):
+        factors = band_averages(partial(relative, f0=f0, loss=loss), num_bands)
+        curves.append({"factors": np.round(factors, 6).tolist(), "channels": channel})
+    return layer | {"curves": {"theta_d": curves}}
 
 
 def dielectric_reflectance(f0: Reflectance, f90: Reflectance) -> Reflectance:

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import PIL.Image
 from jaxtyping import Shaped
+from numpy.typing import NDArray
 
-from relume.scene_io.gltf.images import U8
-
+U8 = NDArray[np.uint8]
 Wrap = tuple[str, str]
 NOISE = 2  # variation that lossy compression adds to a uniform image
 

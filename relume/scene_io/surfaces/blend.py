@@ -2,8 +2,8 @@
 
     diffuse = b (1 - m) (1 - R),  f0 = mix(s min(c f, 1), b, m),  f90 = mix(s, 1, m)
 
-for base color b, metallic m, specular s with color c and reflectance f, see `relume.scene_io.gltf.materials`. The mean
-reflectance R of the dielectric scales the texture if it varies, else the term.
+for base color b, metallic m, specular s with color c and reflectance f, see `make_material`. The mean reflectance R of
+the dielectric scales the texture if it varies, else the term.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from jaxtyping import Shaped
 
 from relume.scene.model import Texture, TextureEncoding
 from relume.scene.texture_encoding import F32, F64, ROWS_PER_BATCH, SRGB_TO_LINEAR, U8, encode_rows
-from relume.scene_io.gltf.texture_resampling import Raster
-from relume.scene_io.gltf.to_terms import dielectric_reflectance
+from relume.scene_io.surfaces.texture_resampling import Raster
+from relume.scene_io.surfaces.to_terms import dielectric_reflectance
 
 
 @dataclass(frozen=True)
