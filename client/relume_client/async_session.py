@@ -45,7 +45,7 @@ class AsyncSession:
 
     def __init__(self, transport: Transport, bake: str, *, view: str | None, timeout: float) -> None:
         self._wanted_view, self._timeout = view, timeout
-        self._socket = SessionSocket(transport, bake, self._receive, self._notify)
+        self._socket = SessionSocket(transport, bake, self._receive, self._on_lost)
         self._changed = asyncio.Condition()
         self._loop = asyncio.get_running_loop()
         self._runner: asyncio.Task[None] | None = None
@@ -260,6 +260,14 @@ class AsyncSession:
         # the server may have merged this edit with earlier ones, so that its look is unknown
         self._send_whole(self._shown_look)
         self._recovery = self._revision
+
+    async def _on_lost(self, sentence: str | None) -> None:
+        """Go back to the last shown look if edits since then have ended the connection."""
+        if sentence is not None and self._sent_looks:
+            self._rejection = EditRejectedError(sentence)
+            self.look._reset(self._shown_look)
+            self._unsent, self._sent_looks, self._socket.resume = [], {}, ""
+        await self._notify()
 
     def _on_frame(self, frame: Frame) -> None:
         header = frame.header

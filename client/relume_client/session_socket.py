@@ -19,6 +19,7 @@ MAX_FRAME_BYTES = 1 << 29
 _MAX_RESUMES = 3
 _VERSION_CODE = 1002
 _LOGIN_CODES = frozenset({4401, 4403})
+_FAULT_CODES = frozenset({1007, 1008, 1009, 1011})
 _BAKE_CODES = {4404: "not-found", 4409: "not-ready", 4410: "store"}
 _LOST = OSError, TimeoutError, InvalidHandshake, ConnectionClosed
 
@@ -35,7 +36,8 @@ class SessionSocket:
     Args:
         transport: address and token. bake: id.
         receive: called with each message; while it runs, no other is read.
-        on_change: called when the connection is lost, or ended for good.
+        on_lost: called when the connection is lost or ended; with the server's sentence if it could not go on, which is
+            the fault of what it was sent.
     """
 
     def __init__(
@@ -43,9 +45,9 @@ class SessionSocket:
         transport: Transport,
         bake: str,
         receive: Callable[[str | bytes], Awaitable[None]],
-        on_change: Callable[[], Awaitable[None]],
+        on_lost: Callable[[str | None], Awaitable[None]],
     ) -> None:
-        self._transport, self._receive, self._on_change = transport, receive, on_change
+        self._transport, self._receive, self._on_lost = transport, receive, on_lost
         self._url = f"{transport.url.replace('http', 'ws', 1)}/api/bakes/{bake}/session"
         self._outbox = asyncio.Queue[str]()
         self.is_open, self.resume, self.reason = False, "", "not connected yet"
@@ -55,11 +57,14 @@ class SessionSocket:
         """Connect, again and again, until the server ends the session for good."""
         attempt = 0
         while self.failure is None:
+            sentence = None
             try:
                 await self._connect()
                 self.reason = "the server is restarting"
             except _LOST as error:
                 self.failure = _final_failure(error)
+                if isinstance(error, ConnectionClosed) and error.rcvd is not None and error.rcvd.code in _FAULT_CODES:
+                    sentence = error.rcvd.reason or f"the server ended the session with code {error.rcvd.code}"
                 self.reason = str(self._transport.unavailable(str(error) or type(error).__name__))
             except Exception as error:  # of a message that cannot be handled: raised where the user waits
                 self.failure = error
@@ -67,7 +72,7 @@ class SessionSocket:
             self.is_open = False
             if attempt > _MAX_RESUMES:
                 self.resume = ""
-            await self._on_change()
+            await self._on_lost(sentence)
             await asyncio.sleep(backoff_s(attempt))
 
     def send(self, message: dict[str, Any]) -> None:
