@@ -113,10 +113,6 @@ class AsyncClient:
         """A bake by its id."""
         return AsyncBake(self._transport, await self._transport.json("GET", f"/api/bakes/{quote(id, '')}"))
 
-    async def models(self) -> list[ModelBody]:
-        """BRDF terms with their parameters and ranges."""
-        return cast("list[ModelBody]", await self._transport.json("GET", "/api/models"))
-
 
 class AsyncScene:
     """A scene of the server; `info` has its materials, views, lights, variants and warnings."""
@@ -270,6 +266,10 @@ class AsyncBake(_AsyncJob[BakeBody]):
         render = await self.submit(looks, "png", view=view, **options)
         await render.wait(timeout=timeout)
         return [decode_displayed(await render.read(index)) for index in range(render.info["total"])]
+
+    async def models(self) -> list[ModelBody]:
+        """BRDF terms with their parameters and ranges."""
+        return cast("list[ModelBody]", await self._transport.json("GET", "/api/models"))
 
     async def delete(self) -> None:
         """Delete the bake in any state."""

@@ -20,7 +20,7 @@ from relume_client.session_socket import SessionSocket
 from relume_client.transport import Transport
 
 Encoding = Literal["hdr", "png", "jpeg"]
-FrameListener = Callable[[Frame], None]
+FrameListener = Callable[[Frame | None], None]
 _MIN_EDIT_INTERVAL_S = 0.01
 _MAX_PATCH_BYTES = MAX_MESSAGE_BYTES // 2
 _MAX_OPERATIONS = 64
@@ -102,20 +102,30 @@ class AsyncSession:
     @property
     def status(self) -> str:
         """State of the image: `exact` or a lower fidelity; `connecting` while there is no connection."""
-        if not self._socket.is_open or self._frame is None:
+        if not self._socket.is_open:
             return "connecting"
+        if self._frame is None:
+            return "preview"
         return "exact" if self._frame.header["exact"] else self._frame.header["fidelity"]
 
     def subscribe(self, listener: FrameListener) -> Callable[[], None]:
-        """Call a function with each frame, in the thread of the event loop; returns a function that ends it."""
+        """Call a function with each frame, and with None when the connection is lost, in the thread of the event loop;
+        returns a function that ends it.
+        """
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
 
     def set_encoding(self, encoding: Encoding) -> None:
         """Choose the pixels of frames: linear (`hdr`), displayed without loss (`png`), displayed and small (`jpeg`)."""
         if encoding != self._encoding:
-            self._encoding, self._frame, self._linear = encoding, None, None
-            self._request_all()
+            self._encoding = encoding
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Ask for the whole image again."""
+        self._frame, self._linear = None, None
+        self._socket.send({"type": "encoding", "format": self._encoding})
+        self._socket.send({"type": "views", "names": [self.view["name"]]})
 
     def move_camera(
         self, to_world: ArrayLike, *, yfov: float | None = None, size: Sequence[int] | None = None, near: float = 0.0
@@ -224,7 +234,7 @@ class AsyncSession:
     def _on_hello(self, hello: HelloMessage) -> None:
         is_first, self._is_greeted = not self._is_greeted, True
         self.hello, self._socket.resume, self._socket.is_open = hello, hello["resume"], True
-        self._frame, self._linear, self._status = None, None, None
+        self._status = None
         self._revision, self._sent_looks = hello["revision"], {}
         self._sent_look = self._shown_look = hello["look"]
         names = [view["name"] for view in hello["views"]]
@@ -236,14 +246,9 @@ class AsyncSession:
             self.look = Look(hello["look"], self._on_change)
         elif hello["look"] != self.look.document:
             self._send_whole(self.look.document)
-        self._request_all()
+        self.refresh()
         if self._camera is not None:
             self._socket.send(self._camera)
-
-    def _request_all(self) -> None:
-        """Ask for the whole image in the encoding."""
-        self._socket.send({"type": "encoding", "format": self._encoding})
-        self._socket.send({"type": "views", "names": [self.view["name"]]})
 
     def _on_problem(self, message: ProblemMessage) -> None:
         problem, revision = message["problem"], message["revision"]
@@ -267,6 +272,8 @@ class AsyncSession:
             self._rejection = EditRejectedError(sentence)
             self.look._reset(self._shown_look)
             self._unsent, self._sent_looks, self._socket.resume = [], {}, ""
+        for listener in tuple(self._listeners):
+            listener(None)
         await self._notify()
 
     def _on_frame(self, frame: Frame) -> None:

@@ -137,10 +137,6 @@ class Client:
         """A bake by its id."""
         return Bake(self._thread, self._thread.run(self._client.bake(id)))
 
-    def models(self) -> list[ModelBody]:
-        """BRDF terms with their parameters and ranges."""
-        return self._thread.run(self._client.models())
-
 
 class Scene:
     """A scene of the server."""
@@ -220,6 +216,10 @@ class Bake:
         """Exact images of looks as arrays. See `AsyncBake.images`."""
         return self._thread.run(self._bake.images(looks, view=view, timeout=timeout, **options))
 
+    def models(self) -> list[ModelBody]:
+        """BRDF terms with their parameters and ranges."""
+        return self._thread.run(self._bake.models())
+
     def delete(self) -> None:
         """Delete the bake in any state."""
         self._thread.run(self._bake.delete())
@@ -293,6 +293,10 @@ class Session:
         """Choose the pixels of frames. See `AsyncSession.set_encoding`."""
         self._thread.call(lambda: self._session.set_encoding(encoding))
 
+    def refresh(self) -> None:
+        """Ask for the whole image again."""
+        self._thread.call(self._session.refresh)
+
     def subscribe(self, listener: FrameListener) -> Callable[[], None]:
-        """Call a function with each frame, in the background thread; returns a function that ends it."""
+        """Call a function with each frame, in the background thread. See `AsyncSession.subscribe`."""
         return self._session.subscribe(listener)

@@ -31,6 +31,7 @@ from relume_client import (
     ServerVersionError,
 )
 from relume_client.transport import Transport, normalize_url
+from relume_server.io.import_request import _import
 
 ROOT = Path(__file__).resolve().parents[2]
 TRIANGLE = b"mtllib colors/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Red\nf 1 2 3\n"
@@ -52,6 +53,13 @@ def test_package_needs_nothing_of_the_server() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": str(ROOT / "client")}, timeout=60)
 
 
+@pytest.fixture
+def _quick_imports(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Import in the server's process: a process of its own takes seconds to start."""
+    monkeypatch.setattr(running.app.state.services.import_queue.importers, "run", _import)
+
+
+@pytest.mark.usefixtures("_quick_imports")
 def test_scene_with_companions_is_imported(client: Client, tmp_path: Path) -> None:
     (tmp_path / "colors").mkdir()
     (tmp_path / "colors" / "m.mtl").write_text("newmtl Red\nKd 0.8 0.1 0.1\n")
@@ -69,6 +77,7 @@ def test_scene_with_companions_is_imported(client: Client, tmp_path: Path) -> No
     assert (missing.value.status, missing.value.kind) == (404, "not-found")
 
 
+@pytest.mark.usefixtures("_quick_imports")
 def test_rejections_have_the_sentence_and_the_fields(client: Client, bake: Bake, tmp_path: Path) -> None:
     (tmp_path / "bad.glb").write_bytes(b"glTF nonsense")
     with pytest.raises(ProblemError) as rejected:

@@ -161,7 +161,7 @@ def test_fixed_cameras_do_not_move(bake: Bake) -> None:
 def test_listeners_get_frames_until_they_leave(bake: Bake) -> None:
     with bake.session() as session:
         revisions = list[int]()
-        leave = session.subscribe(lambda frame: revisions.append(frame.header["revision"]))
+        leave = session.subscribe(lambda frame: revisions.append(frame.header["revision"]) if frame else None)
         session["Paper"].sigma = 0.4
         session.frame()
         leave()

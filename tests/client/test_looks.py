@@ -67,7 +67,6 @@ def test_a_copy_and_former_documents_stay(look: Look) -> None:
 def test_a_term_is_replaced(look: Look) -> None:
     look["Teapot"].terms[1] = LAMBERT
     assert look.document["materials"]["Teapot"]["terms"] == [LAMBERT, LAMBERT]
-    look["Panel"] if "Panel" in look else None
     look.materials["Panel"].terms = [GGX]
     assert look.materials["Panel"].roughness == 0.5
 
@@ -81,9 +80,7 @@ def test_optional_fields_can_be_set(look: Look) -> None:
 
 
 def test_unknown_names_list_what_there_is(look: Look) -> None:
-    with pytest.raises(
-        AttributeError, match=r"/materials/Teapot has no 'rougness'; did you mean 'roughness'\? It has:"
-    ):
+    with pytest.raises(AttributeError, match=r"/materials/Teapot has no 'rougness'; did you mean 'roughness'\? It"):
         look["Teapot"].rougness = 0.3
     with pytest.raises(KeyError, match="the look has no 'teapot'; did you mean 'Teapot'"):
         look["teapot"]
