@@ -142,7 +142,8 @@ class LookWidget(anywidget.AnyWidget):  # type: ignore[misc]
 
 def _first_orbit(view: ViewInfo) -> Orbit:
     pose = np.reshape(view["camera"]["to_world"], (4, 4))
-    middle = np.mean(view["bounds"], axis=0) if view.get("bounds") else pose[:3, 3] - pose[:3, 2]
+    bounds = view["bounds"]
+    middle = pose[:3, 3] - pose[:3, 2] if bounds is None else np.mean(bounds, axis=0)
     return Orbit.from_pose(pose, middle)
 
 
