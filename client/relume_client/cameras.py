@@ -55,7 +55,7 @@ class Orbit:
         return cls((float(pivot[0]), float(pivot[1]), float(pivot[2])), float(yaw), float(pitch), distance)
 
     def turned(self, yaw: float, pitch: float, zoom: float = 1.0) -> Orbit:
-        """The orbit after a drag: angles are added, the distance is multiplied by `zoom`."""
+        """The orbit after a drag: `yaw` and `pitch` are added, the distance is multiplied by `zoom`."""
         return replace(
             self,
             yaw=self.yaw + yaw,

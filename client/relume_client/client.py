@@ -1,4 +1,4 @@
-"""The same for programs without an event loop: each call waits for its result.
+"""Scenes, bakes and sessions for programs without an event loop: each call waits for its result.
 
 All calls of a client run in one background thread, which also answers the server while the program does other work.
 """
@@ -35,13 +35,14 @@ Result = TypeVar("Result")
 
 
 class LoopThread:
-    """An event loop in a background thread, which ends with the program."""
+    """An event loop in a background thread. It ends when nothing uses it any more, or with the program."""
 
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="relume-client", daemon=True)
         self._thread.start()
-        self.close = weakref.finalize(self, _end, self._loop, self._thread)
+        self._closing = list[Callable[[], Coroutine[Any, Any, None]]]()
+        self.close = weakref.finalize(self, _end, self._loop, self._thread, self._closing)
 
     def run(self, work: Coroutine[Any, Any, Result]) -> Result:
         """Run a coroutine and wait for it; an interrupt cancels it."""
@@ -52,6 +53,10 @@ class LoopThread:
             future.cancel()
             raise
 
+    def before_close(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Run a coroutine before the loop ends."""
+        self._closing.append(work)
+
     def call(self, function: Callable[[], Result]) -> Result:
         """Call a function in the thread and wait for its result."""
 
@@ -61,7 +66,16 @@ class LoopThread:
         return self.run(work())
 
 
-def _end(loop: asyncio.AbstractEventLoop, thread: threading.Thread) -> None:
+def _end(
+    loop: asyncio.AbstractEventLoop,
+    thread: threading.Thread,
+    closing: Sequence[Callable[[], Coroutine[Any, Any, None]]],
+) -> None:
+    if threading.current_thread() is thread:  # the last reference was the loop's own: it cannot wait for itself
+        loop.stop()
+        return
+    for work in closing:
+        asyncio.run_coroutine_threadsafe(work(), loop).result()
     loop.call_soon_threadsafe(loop.stop)
     thread.join()
     loop.close()
@@ -94,6 +108,7 @@ class Client:
         except BaseException:
             self._thread.close()
             raise
+        self._thread.before_close(self._client.close)
 
     def __enter__(self) -> Self:
         return self
@@ -105,9 +120,7 @@ class Client:
 
     def close(self) -> None:
         """Close all connections; also at the end of the program."""
-        if self._thread.close.alive:
-            self._thread.run(self._client.close())
-            self._thread.close()
+        self._thread.close()
 
     def import_scene(
         self,
@@ -274,11 +287,13 @@ class Session:
     @overload
     def frame(
         self, *, exact: bool = ..., linear: Literal[False] = ..., timeout: float | None = ...
-    ) -> NDArray[np.uint8]: ...
+    ) -> NDArray[np.uint8]:
+        """See `AsyncSession.frame`."""
+
     @overload
-    def frame(
-        self, *, exact: bool = ..., linear: Literal[True], timeout: float | None = ...
-    ) -> NDArray[np.float32]: ...
+    def frame(self, *, exact: bool = ..., linear: Literal[True], timeout: float | None = ...) -> NDArray[np.float32]:
+        """See `AsyncSession.frame`."""
+
     def frame(self, *, exact: bool = True, linear: bool = False, timeout: float | None = None) -> NDArray[Any]:
         """Image of the look with all edits so far. See `AsyncSession.frame`."""
         return self._thread.run(self._session.frame(exact=exact, linear=linear, timeout=timeout))

@@ -223,14 +223,14 @@ class Look(LookPart):
         return {**{name: path for name, path in names if count[name] == 1}, **fields}
 
     def _value(self, path: Path) -> Any:
-        part = LookPart(self, path)
-        value = part.document
+        child = LookPart(self, path)
+        value = child.document
         if len(path) == 2 and path[0] == "materials":
             return MaterialPart(self, path)
         if len(path) == 4 and path[0] == "materials" and path[2] == "terms":
             return TermPart(self, path)
         is_color = isinstance(value, list) and all(isinstance(item, int | float) for item in value)
-        return part if isinstance(value, dict | list) and not is_color else tuple(value) if is_color else value
+        return child if isinstance(value, dict | list) and not is_color else tuple(value) if is_color else value
 
     def _set(self, changes: Sequence[Change]) -> None:
         """Make changes, and report them."""

@@ -132,8 +132,8 @@ class LookWidget(anywidget.AnyWidget):  # type: ignore[misc]
             case "shown":
                 self._send_frame()
             case "edit":
-                part, name = self._numbers[message["control"]]
-                part[name] = message["value"]
+                owner, name = self._numbers[message["control"]]
+                owner[name] = message["value"]
             case "orbit" if self.can_orbit:
                 turn = 2 * np.pi / _TURN_PIXELS
                 self._orbit = self._orbit.turned(-turn * message["x"], turn * message["y"], message["zoom"])
@@ -148,32 +148,32 @@ def _first_orbit(view: ViewInfo) -> Orbit:
 
 
 def _find(look: Look, slider: Slider) -> tuple[LookPart, str]:
-    """The part and the name of a number. Names of materials may have dots: the longest that there is counts."""
+    """The part of the look that has a number, and its name there. Names of materials may have dots: the longest counts."""
     text = slider if isinstance(slider, str) else slider[0]
-    part: Any = look
+    owner: Any = look
     steps = text.split(".")
     while True:
-        count = next((n for n in range(len(steps), 0, -1) if ".".join(steps[:n]) in part), 1)
+        count = next((n for n in range(len(steps), 0, -1) if ".".join(steps[:n]) in owner), 1)
         name, steps = ".".join(steps[:count]), steps[count:]
         try:
-            value = part[int(name) if name.isdigit() and name not in part else name]
+            value = owner[int(name) if name.isdigit() and name not in owner else name]
         except (KeyError, IndexError) as error:
             raise ValueError(f"there is no slider for {text!r}: {error.args[0]}") from None
         if not steps and isinstance(value, int | float) and not isinstance(value, bool):
-            return part, name
+            return owner, name
         if not steps or not isinstance(value, LookPart):
             raise ValueError(f"there is no slider for {text!r}, which is {value!r}; name a number")
-        part = value
+        owner = value
 
 
-def _control(part: LookPart, name: str, models: Sequence[ModelBody], slider: Slider) -> Control:
+def _control(owner: LookPart, name: str, models: Sequence[ModelBody], slider: Slider) -> Control:
     """The slider of a number: with the range that was given, that of a parameter, or one that suits its value."""
-    label, value = slider if isinstance(slider, str) else slider[0], float(part[name])
-    path = part._find(name)
+    label, value = slider if isinstance(slider, str) else slider[0], float(owner[name])
+    path = owner._find(name)
     if not isinstance(slider, str):
         return Control(label, slider[1], slider[2], value)
     if path[-2] == "params":
-        model = part._root.materials[path[1]].terms[path[3]].model
+        model = owner._root.materials[path[1]].terms[path[3]].model
         parameter = next(p for m in models if m["model"] == model for p in m["parameters"] if p["name"] == name)
         scale = parameter["scale"] if parameter["minimum"] > 0 else "linear"
         return Control(label, parameter["minimum"], parameter["maximum"], value, scale)

@@ -77,13 +77,13 @@ def _options(request: Schema, omitted: frozenset[str]) -> Schema:
 
 def _with_references(names: Iterable[str], schemas: Mapping[str, Schema]) -> dict[str, Schema]:
     """The named schemas, and those that they refer to."""
-    chosen, waiting = dict[str, Schema](), list(names)
+    reachable, waiting = dict[str, Schema](), list(names)
     while waiting:
         name = waiting.pop()
-        if name not in chosen:
-            chosen[name] = schemas[name]
+        if name not in reachable:
+            reachable[name] = schemas[name]
             waiting.extend(_references(schemas[name]))
-    return chosen
+    return reachable
 
 
 def _references(schema: object) -> Iterator[str]:
