@@ -148,7 +148,7 @@ def _first_orbit(view: ViewInfo) -> Orbit:
 
 
 def _find(look: Look, slider: Slider) -> tuple[LookPart, str]:
-    """The part of the look that has a number, and its name there. Names of materials may have dots: the longest counts."""
+    """The part of the look that has a number, and its name. Names of materials may have dots: the longest counts."""
     text = slider if isinstance(slider, str) else slider[0]
     owner: Any = look
     steps = text.split(".")

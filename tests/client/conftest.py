@@ -25,7 +25,6 @@ def _no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def running(settings: Settings, control: Control) -> Iterator[Running]:
-    settings.drain_seconds = 60.0
     with running_server(settings, control) as running:
         yield running
 
