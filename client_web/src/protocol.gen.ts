@@ -120,10 +120,10 @@ export interface EditMessage {
   solo?: string[] | null;
 }
 
-/** client → server: encoding of images. "auto": HDR, but JPEG while moving if the connection is too slow for it. */
+/** client → server: encoding of images. "auto": HDR, but JPEG while moving if the connection is too slow for it. "png": displayed images without loss, as batch renders have them. */
 export interface EncodingMessage {
   type: "encoding";
-  format: "hdr" | "jpeg" | "auto";
+  format: "hdr" | "jpeg" | "png" | "auto";
   quality?: number;
 }
 
@@ -534,7 +534,7 @@ export interface FrameHeader {
   width: number;
   height: number;
   tiles: [number, number, number, number][];
-  format: "rgb9e5" | "jpeg" | "f32" | "r8" | "arrays";
+  format: "rgb9e5" | "jpeg" | "png" | "f32" | "r8" | "arrays";
   exact: boolean;
   fidelity: Fidelity;
   complete: boolean;

@@ -29,6 +29,8 @@ SOURCES = sorted(
         "worker",
         "server",
         "cli",
+        "client",
+        "examples",
         "bench",
         "tests",
         "scripts",

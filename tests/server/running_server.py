@@ -33,12 +33,16 @@ class Running:
 
     def baked_url(self) -> str:
         """Address of the session of a finished bake."""
+        return f"ws://127.0.0.1:{self.port}/api/bakes/{self.bake()}/session"
+
+    def bake(self) -> str:
+        """Id of a finished bake."""
         bakes = self.app.state.services.bakes
         scene = register_scene(bakes.data_dir, bakes.ledger, tiny_scene())
         bake = bakes.submit(scene, Recipe("direct", ("front",), SIZE, 10))
         with bakes.subscribe(bake) as changes:
             assert list(changes)[-1].state == "ready"
-        return f"ws://127.0.0.1:{self.port}/api/bakes/{bake}/session"
+        return bake
 
 
 @contextmanager
@@ -50,11 +54,11 @@ def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
 
 
 @contextmanager
-def running_server(settings: Settings, control: Control) -> Iterator[Running]:
+def running_server(settings: Settings, control: Control, port: int = 0) -> Iterator[Running]:
     settings.allowed_hosts = ["127.0.0.1"]
     app = create_app(settings, open_library=control.open_library, open_steps=InThreadSteps, open_bakes=open_fake_bakes)
     process = create_server(app, settings)
-    with socket.create_server(("127.0.0.1", 0)) as listening:
+    with socket.create_server(("127.0.0.1", port)) as listening:
         thread = threading.Thread(target=process.run, kwargs={"sockets": [listening]})
         thread.start()
         while not process.started:

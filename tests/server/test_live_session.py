@@ -15,6 +15,8 @@ from server_fakes import SIZE, Control
 from server_fixtures import impatient
 from session_client import SIGMA, THETA_H, Baked, open_session
 
+from relume.image_io.tone_mapping import tone_map
+from relume.image_io.write_image import to_bytes
 from relume_server.client_state.flow_control import FrameWindow
 from relume_server.client_state.socket import ClientSocket
 from relume_server.schemas.protocol import FrameHeader
@@ -275,6 +277,19 @@ def test_jpeg_stream_sends_complete_images(client: TestClient, baked: Baked) -> 
         assert frame.header["format"] == "jpeg"
         assert frame.header["tiles"] == [[0, 0, WIDTH, HEIGHT]]
         assert frame.payload[:2] == b"\xff\xd8"
+
+
+def test_png_stream_sends_the_displayed_image_without_loss(client: TestClient, baked: Baked) -> None:
+    with open_session(client, baked.bake) as session:
+        session.exact(0)
+        session.send_message(type="encoding", format="png")
+        session.send_message(type="view", name="left", size=[80, 80])  # only JPEGs are scaled down
+        session.edit(1, SIGMA, 0.4)
+        while (frame := session.exact(1)).header["view"] != "left":
+            pass
+    assert (frame.header["format"], frame.header["tiles"]) == ("png", [[0, 0, WIDTH, HEIGHT]])
+    displayed = to_bytes(tone_map(np.full((HEIGHT, WIDTH, 3), 0.9, np.float32), 0.0, "agx"))
+    assert np.array_equal(np.array(Image.open(io.BytesIO(frame.payload))), displayed)
 
 
 @pytest.mark.parametrize(

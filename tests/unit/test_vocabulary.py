@@ -16,9 +16,19 @@ PACKAGES = {
     "worker": "worker/relume_worker",
     "server": "server/relume_server",
     "cli": "cli/relume_cli",
+    "client": "client/relume_client",
     "bench": "bench/relume_bench",
 }
-SPOKEN = (*PACKAGES.values(), "tests", "client_web/src", "client_web/index.html", "docs", "README.md", "CHANGELOG.md")
+SPOKEN = (
+    *PACKAGES.values(),
+    "tests",
+    "examples",
+    "client_web/src",
+    "client_web/index.html",
+    "docs",
+    "README.md",
+    "CHANGELOG.md",
+)
 MAX_VAGUE_NAMES = 100
 
 EXCEPTIONS: dict[str, str] = {

@@ -30,7 +30,7 @@ class PendingRequests:
     active_parameter: str | None = None
     inspect: InspectMessage | None = None
     highlight: HighlightMessage | None = None
-    form: Literal["hdr", "jpeg", "auto"] = "auto"
+    form: Literal["hdr", "jpeg", "png", "auto"] = "auto"
     quality: int = 80
     renderer: Literal["client", "server"] = "server"
     space: tuple[int, int] | None = None

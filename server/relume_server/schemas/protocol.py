@@ -2,10 +2,10 @@
 
 Text messages are JSON, at most `MAX_MESSAGE_BYTES`. A binary message is one frame: uint32 little-endian header length,
 JSON header (`FrameHeader`), payload. The payload contains the tiles of the header in order, row-major, top row first:
-"rgb9e5" 4 bytes per pixel, "f32" 12 bytes per pixel, "jpeg" one image of the whole view, perhaps with fewer pixels,
-"r8" one byte per pixel (frames of kind "highlight": 0…255 stands for 0…1). With `alpha` in the header, one byte of
-coverage per pixel of the same tiles follows; the radiance is premultiplied. A frame of kind "scene_update" has no
-tiles: its payload is the arrays that `scene_update` names, little-endian, in order.
+"rgb9e5" 4 bytes per pixel, "f32" 12 bytes per pixel, "jpeg" and "png" one displayed image of the whole view, a JPEG
+perhaps with fewer pixels, "r8" one byte per pixel (frames of kind "highlight": 0…255 stands for 0…1). With `alpha` in
+the header, one byte of coverage per pixel of the same tiles follows; the radiance is premultiplied. A frame of kind
+"scene_update" has no tiles: its payload is the arrays that `scene_update` names, little-endian, in order.
 """
 
 from __future__ import annotations
@@ -107,10 +107,12 @@ class AckMessage(Message):
 
 
 class EncodingMessage(Message):
-    """client → server: encoding of images. "auto": HDR, but JPEG while moving if the connection is too slow for it."""
+    """client → server: encoding of images. "auto": HDR, but JPEG while moving if the connection is too slow for it.
+    "png": displayed images without loss, as batch renders have them.
+    """
 
     type: Literal["encoding"]
-    format: Literal["hdr", "jpeg", "auto"]
+    format: Literal["hdr", "jpeg", "png", "auto"]
     quality: Annotated[int, Field(ge=1, le=95)] = 80
 
 
@@ -429,7 +431,7 @@ class FrameHeader(Message):
     width: int
     height: int
     tiles: list[tuple[int, int, int, int]]
-    format: Literal["rgb9e5", "jpeg", "f32", "r8", "arrays"]
+    format: Literal["rgb9e5", "jpeg", "png", "f32", "r8", "arrays"]
     exact: bool
     fidelity: Fidelity
     complete: bool

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from relume.live.fixed_camera.picture import Progress
     from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
 
-Format = Literal["rgb9e5", "jpeg"]
+Format = Literal["rgb9e5", "jpeg", "png"]
+DISPLAYED: frozenset[str] = frozenset({"jpeg", "png"})
+"""Formats of one displayed image of the whole view."""
 _NOTHING = object()
 
 
@@ -171,7 +173,7 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
 
 def _tiles_outside_region(missing_tiles: frozenset[Tile], request: FrameRequest) -> frozenset[Tile]:
     """Tiles that can be sent later while the image changes."""
-    if request.region is None or request.form == "jpeg":
+    if request.region is None or request.form in DISPLAYED:
         return frozenset()
     left, top, across, down = request.region
     return frozenset(
@@ -242,23 +244,39 @@ def _payload(
     picture: Picture, request: FrameRequest, requested_tiles: frozenset[Tile]
 ) -> tuple[list[Tile], bytes, bytes | None]:
     """Tiles of a frame, their pixels, and their coverage if they are not opaque."""
-    if request.form == "jpeg":
-        jpeg = encode_jpeg(picture, request.target.look.display, request.jpeg_size, request.quality)
-        return [(0, 0, *request.size)], jpeg, None
+    if request.form != "rgb9e5":
+        display = request.target.look.display
+        is_jpeg = request.form == "jpeg"
+        image = (
+            encode_jpeg(picture, display, request.jpeg_size, request.quality)
+            if is_jpeg
+            else encode_png(picture, display)
+        )
+        return [(0, 0, *request.size)], image, None
     tiles = sorted(requested_tiles, key=lambda tile: (tile[1], tile[0]))
     return tiles, picture.encode(tiles, "rgb9e5"), picture.encode_alpha(tiles)
 
 
 def encode_jpeg(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
     """Encode an image as displayed, scaled down to a size if needed."""
-    image = downsample(picture.image(), size)
-    try:
-        displayed = tone_map(image, display.exposure, display.tone_map, use_table=True)
-    except ParameterError:  # the server lacks the OpenColorIO view: the editor reports it, and shows this
-        displayed = tone_map(image, display.exposure, "agx")
+    displayed = _displayed(downsample(picture.image(), size), display, use_table=True)
     buffer = io.BytesIO()
-    Image.fromarray(to_bytes(displayed)).save(buffer, "JPEG", quality=quality)
+    Image.fromarray(displayed).save(buffer, "JPEG", quality=quality)
     return buffer.getvalue()
+
+
+def encode_png(picture: Picture, display: DisplayLook) -> bytes:
+    """Encode an image as displayed, without loss; little compression, which would take longer than most links."""
+    buffer = io.BytesIO()
+    Image.fromarray(_displayed(picture.image(), display, use_table=False)).save(buffer, "PNG", compress_level=1)
+    return buffer.getvalue()
+
+
+def _displayed(image: NDArray[Any], display: DisplayLook, *, use_table: bool) -> NDArray[Any]:
+    try:
+        return to_bytes(tone_map(image, display.exposure, display.tone_map, use_table=use_table))
+    except ParameterError:  # the server lacks the OpenColorIO view: the editor reports it, and shows this
+        return to_bytes(tone_map(image, display.exposure, "agx"))
 
 
 def encode_highlight(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:

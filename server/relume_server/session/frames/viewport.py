@@ -14,7 +14,7 @@ from relume_server.runtime.protocols import FreeCameraPicture, Picture, Tile
 from relume_server.schemas.protocol import HighlightMessage
 from relume_server.session.frames.client_render_state import ClientRenderState
 from relume_server.session.frames.coefficient_budget import CoefficientBudget
-from relume_server.session.frames.painter import Format, FrameRequest, Painted
+from relume_server.session.frames.painter import DISPLAYED, Format, FrameRequest, Painted
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
@@ -114,7 +114,7 @@ class Viewport:
         size = self.size if camera_state is None else camera_state.size
         received_s = camera_state.received_s if camera_state is not None and has_moved else newest.received_s
         is_interactive = is_new and received_s is not None
-        is_client_rendered = self._has_shader and pending.form != "jpeg"
+        is_client_rendered = self._has_shader and pending.form not in DISPLAYED
         was_sent_recently = time.perf_counter() - self._last_sent_s < REFINE_SEND_INTERVAL_S
         if is_interactive and is_client_rendered:
             is_client_rendered = not self._client_render_state.are_too_large(newest, window, self.is_outdated(newest))
@@ -122,7 +122,7 @@ class Viewport:
             is_client_rendered = False
         self._is_link_slow = is_slow = window.is_slow_for(self._interactive_bytes, was_slow=self._is_link_slow)
         needs_jpeg = pending.form == "auto" and is_slow and is_interactive and not is_client_rendered
-        form: Format = "jpeg" if pending.form == "jpeg" or needs_jpeg else "rgb9e5"
+        form: Format = "png" if pending.form == "png" else "jpeg" if pending.form == "jpeg" or needs_jpeg else "rgb9e5"
         is_early = is_slow or was_sent_recently
         is_answered = self._answered_target is newest
         if self._is_free_camera:
@@ -158,7 +158,7 @@ class Viewport:
         """True if something is to be sent after a drag: HDR tiles after a JPEG or after unsent steps, or shader inputs
         after images that were sent instead.
         """
-        return (bool(self._missing_tiles) or self._has_outdated_tables) and pending.form != "jpeg"
+        return (bool(self._missing_tiles) or self._has_outdated_tables) and pending.form not in DISPLAYED
 
     @property
     def _has_outdated_tables(self) -> bool:
@@ -191,7 +191,7 @@ class Viewport:
             else:
                 self._wait(is_done, pending)
             return
-        self._missing_tiles = self._all_tiles if request.form == "jpeg" else painted.deferred_tiles
+        self._missing_tiles = self._all_tiles if request.form in DISPLAYED else painted.deferred_tiles
         self._has_unsent, self._answered_target, self.is_exact = False, request.target, exact
         self._visible_exact_target = request.target if painted.progress.fidelity == Fidelity.EXACT else None
         self._is_blank = self._is_blank and not exact

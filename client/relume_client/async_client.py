@@ -1,0 +1,335 @@
+"""Scenes, bakes and renders of a server, for programs with an event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Generic, Self, TypeVar, Unpack, cast
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relume_client.async_session import AsyncSession
+from relume_client.bodies import (
+    BakeBody,
+    BakeOptions,
+    ImportOptions,
+    LookDocument,
+    ModelBody,
+    RenderBody,
+    RenderOptions,
+    SceneBody,
+)
+from relume_client.errors import JobFailedError
+from relume_client.images import decode_displayed
+from relume_client.looks import Look, to_json
+from relume_client.transport import Transport, normalize_url
+
+AnyLook = LookDocument | Mapping[str, Any] | Look
+Looks = AnyLook | Sequence[AnyLook]
+Body = TypeVar("Body", BakeBody, RenderBody)
+Progress = bool | Callable[[BakeBody | RenderBody], object]
+_POLL_S = 0.2, 2.0
+_MAX_COMPANIONS = 900
+
+
+class AsyncClient:
+    """A relume server.
+
+    Args:
+        url: its address, with the path of a proxy if there is one; default: RELUME_URL, or http://127.0.0.1:8420.
+        token: access token; default: RELUME_TOKEN. Servers without login need none.
+        timeout: seconds that one call may take, an upload included.
+        retry_seconds: time for which a server that is away or busy is tried again.
+    """
+
+    def __init__(
+        self, url: str | None = None, token: str | None = None, *, timeout: float = 600.0, retry_seconds: float = 10.0
+    ) -> None:
+        token = token or os.environ.get("RELUME_TOKEN") or None
+        self._transport = Transport(normalize_url(url), token, timeout=timeout, retry_seconds=retry_seconds)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close all connections."""
+        await self._transport.close()
+
+    async def import_scene(
+        self,
+        file: str | os.PathLike[str],
+        *,
+        environment: str | os.PathLike[str] | None = None,
+        companions: Sequence[str | os.PathLike[str]] = (),
+        **options: Unpack[ImportOptions],
+    ) -> AsyncScene:
+        """Import a scene file. The same file with the same name is the same scene.
+
+        Args:
+            file: .glb, .gltf, .obj, .ply, .stl, .usd, or a .zip with one and its files.
+            environment: .hdr or .exr; by default the built-in studio.
+            companions: files that the scene names, or folders with them; their names are relative to its folder.
+            options: `name`, `up`, `unit`, `recenter`, `light_unit`, `scene_name`, `ground`.
+        Raises:
+            FileNotFoundError: a file is not there. ProblemError: the server rejects the scene; the message lists why.
+        """
+        scene_file = Path(file)
+        with contextlib.ExitStack() as opened:
+            parts = [("scene", (scene_file.name, opened.enter_context(scene_file.open("rb"))))]
+            if environment is not None:
+                path = Path(environment)
+                parts.append(("environment", (path.name, opened.enter_context(path.open("rb")))))
+            for name, path in _companions(scene_file, companions):
+                parts.append(("companions", (name, opened.enter_context(path.open("rb")))))
+            body = await self._transport.json("POST", "/api/scenes", data=to_json(options), files=parts)
+        return AsyncScene(self._transport, body)
+
+    async def example(self, name: str) -> AsyncScene:
+        """A built-in scene by name, such as `still_life`."""
+        return AsyncScene(self._transport, await self._transport.json("POST", f"/api/example-scenes/{quote(name, '')}"))
+
+    async def scenes(self) -> list[AsyncScene]:
+        """All scenes of the server."""
+        return [AsyncScene(self._transport, body) for body in await self._transport.json("GET", "/api/scenes")]
+
+    async def scene(self, id: str) -> AsyncScene:  # noqa: A002
+        """A scene by its id."""
+        return AsyncScene(self._transport, await self._transport.json("GET", f"/api/scenes/{quote(id, '')}"))
+
+    async def bake(self, id: str) -> AsyncBake:  # noqa: A002
+        """A bake by its id."""
+        return AsyncBake(self._transport, await self._transport.json("GET", f"/api/bakes/{quote(id, '')}"))
+
+
+class AsyncScene:
+    """A scene of the server; `info` has its materials, views, lights, variants and warnings."""
+
+    def __init__(self, transport: Transport, info: SceneBody) -> None:
+        self._transport, self.info = transport, info
+
+    @property
+    def id(self) -> str:
+        """Id on the server."""
+        return self.info["id"]
+
+    async def bake(self, method: str = "gather", **options: Unpack[BakeOptions]) -> AsyncBake:
+        """Queue a bake; the same recipe is the same bake.
+
+        Args:
+            method: `direct`, `gather` (with indirect light) or `probes` (free camera).
+            options: `size`, `preset`, `views`, `lights`, `probes`, `patches`, `gather_rays`, `relightable`, `aspect`.
+        """
+        request = to_json({"scene": self.id, "method": method, **options})
+        return AsyncBake(self._transport, await self._transport.json("POST", "/api/bakes", body=request))
+
+    async def delete(self) -> None:
+        """Delete the scene with its bakes."""
+        await self._transport.json("DELETE", f"/api/scenes/{self.id}")
+
+
+class _AsyncJob(Generic[Body]):
+    """Work of the server; `info` is its last known state."""
+
+    _path: str
+    _label: str
+    info: Body
+
+    def __init__(self, transport: Transport, info: Body) -> None:
+        self._transport, self.info = transport, info
+
+    @property
+    def id(self) -> str:
+        """Id on the server."""
+        return str(self.info["id"])
+
+    async def refresh(self) -> Body:
+        """Read the state anew."""
+        body: Body = await self._transport.json("GET", f"{self._path}/{self.id}")
+        self.info = body
+        return body
+
+    async def wait(self, *, progress: Progress = False, timeout: float | None = None) -> Self:
+        """Wait until it is ready.
+
+        Args:
+            progress: true shows it on stderr; or a function that gets each state.
+            timeout: seconds; by default as long as it takes.
+        Raises:
+            JobFailedError: it failed or was canceled; the message is the server's.
+            TimeoutError: it is not ready in time; it goes on.
+        """
+        report = _progress_line(self._label) if progress is True else progress or (lambda body: None)
+        pause_s, longest_s = _POLL_S
+        start_s = time.monotonic()
+        while True:
+            report(self.info)
+            if self.info["state"] == "ready":
+                return self
+            if self.info["state"] in ("failed", "canceled"):
+                raise JobFailedError(self.info["problem"] or f"the {self._label} was {self.info['state']}")
+            if timeout is not None and time.monotonic() + pause_s - start_s > timeout:
+                raise TimeoutError(f"the {self._label} {self.id} is not ready after {timeout:g} s; it goes on")
+            await asyncio.sleep(pause_s)
+            pause_s = min(longest_s, 1.2 * pause_s)
+            await self.refresh()
+
+
+class AsyncBake(_AsyncJob[BakeBody]):
+    """A bake of a scene: what looks are shown with."""
+
+    _path, _label = "/api/bakes", "bake"
+
+    def session(self, *, view: str | None = None, timeout: float = 120.0) -> AsyncSession:
+        """A live session with this bake, for `async with`.
+
+        Args:
+            view: name of the view to show; by default the first.
+            timeout: seconds to wait for the connection, and for each frame.
+        """
+        return AsyncSession(self._transport, self.id, view=view, timeout=timeout)
+
+    async def look(self, changes: AnyLook = {}) -> Look:  # noqa: B006 - never changed
+        """The scene's own look with changes, complete, to be edited without a session."""
+        request = {"bake": self.id, "looks": [to_json(changes)]}
+        body = await self._transport.json("POST", "/api/renders/looks", body=request)
+        return Look(body["looks"][0])
+
+    async def submit(
+        self, looks: Looks, image_format: str, *, view: str | None = None, **options: Unpack[RenderOptions]
+    ) -> AsyncRender:
+        """Queue exact images of looks; see `render`.
+
+        Args:
+            looks: one or several; with `frames`, keyframes of an animation.
+            image_format: `exr`, `png`, `webp` or `mp4`.
+            view: name of a view; by default the first.
+            options: fields of the request, as in docs/api.md: `frames`, `path`, `size`, `layers`, `fps` and others.
+        """
+        documents = [looks] if isinstance(looks, Mapping | Look) else list(looks)
+        name = self.info["recipe"]["views"][0] if view is None else view
+        request = to_json({"bake": self.id, "looks": documents, "format": image_format, "view": name, **options})
+        return AsyncRender(self._transport, await self._transport.json("POST", "/api/renders", body=request))
+
+    async def render(
+        self,
+        looks: Looks,
+        out: str | os.PathLike[str],
+        *,
+        view: str | None = None,
+        progress: Progress = False,
+        timeout: float | None = None,
+        **options: Unpack[RenderOptions],
+    ) -> list[Path]:
+        """Render exact images of looks into files.
+
+        Args:
+            looks: one or several, perhaps partial; with `frames`, keyframes of an animation.
+            out: a file, whose ending is the format (.png, .exr, .webp, .mp4); with several images, {} in its name
+                becomes their number from 0. Folders are made.
+            view, options: as in `submit`. progress, timeout: as in `wait`.
+        Returns:
+            The files, in order.
+        Raises:
+            ValueError: the file's ending is no format, or several images have one name; before anything is rendered.
+        """
+        target = Path(out)
+        format_name = _format(target)
+        render = await self.submit(looks, format_name, view=view, **options)
+        if render.info["total"] > 1 and format_name != "mp4" and "{}" not in str(out):
+            await render.delete()
+            raise ValueError(f"{render.info['total']} images need {{}} in their name, such as 'image_{{}}.png'")
+        await render.wait(progress=progress, timeout=timeout)
+        return await render.save(target)
+
+    async def images(
+        self, looks: Looks, *, view: str | None = None, timeout: float | None = None, **options: Unpack[RenderOptions]
+    ) -> list[NDArray[np.uint8]]:
+        """Exact images of looks as arrays, as displayed. (height, width, 3) uint8 each
+
+        Args:
+            looks: one or several, perhaps partial; with `frames`, keyframes of an animation.
+            view, options: as in `submit`. timeout: as in `wait`.
+        """
+        render = await self.submit(looks, "png", view=view, **options)
+        await render.wait(timeout=timeout)
+        return [decode_displayed(await render.read(index)) for index in range(render.info["total"])]
+
+    async def models(self) -> list[ModelBody]:
+        """BRDF terms with their parameters and ranges."""
+        return cast("list[ModelBody]", await self._transport.json("GET", "/api/models"))
+
+    async def delete(self) -> None:
+        """Delete the bake in any state."""
+        await self._transport.json("DELETE", f"/api/bakes/{self.id}?delete_files=true")
+
+
+class AsyncRender(_AsyncJob[RenderBody]):
+    """A batch of images."""
+
+    _path, _label = "/api/renders", "render"
+
+    async def read(self, index: int) -> bytes:
+        """The file of one image."""
+        return await self._transport.read(f"/api/renders/{self.id}/frames/{index}")
+
+    async def save(self, target: Path) -> list[Path]:
+        """Download all images; {} in the name of the target becomes their number. A video is one file."""
+        if self.info["format"] == "mp4":
+            await self._transport.download(f"/api/renders/{self.id}/video.mp4", target)
+            return [target]
+        files = [Path(str(target).replace("{}", f"{index:04}")) for index in range(self.info["total"])]
+        for index, file in enumerate(files):
+            await self._transport.download(f"/api/renders/{self.id}/frames/{index}", file)
+        return files
+
+    async def delete(self) -> None:
+        """Delete the render and its images."""
+        await self._transport.json("DELETE", f"/api/renders/{self.id}")
+
+
+def _format(target: Path) -> str:
+    """Format of a file by its ending."""
+    ending = target.suffix.lower().removeprefix(".")
+    if ending not in ("png", "exr", "webp", "mp4"):
+        raise ValueError(f"{target} does not end in .png, .exr, .webp or .mp4")
+    return ending
+
+
+def _companions(scene: Path, companions: Sequence[str | os.PathLike[str]]) -> list[tuple[str, Path]]:
+    """Companion files with their names relative to the scene's folder; folders stand for all files in them."""
+    paths = [Path(companion) for companion in companions]
+    files = [file for path in paths for file in (sorted(path.rglob("*")) if path.is_dir() else [path])]
+    files = [file for file in files if not file.is_dir() and file != scene]
+    if len(files) > _MAX_COMPANIONS:
+        raise ValueError(f"{len(files)} companions are more than {_MAX_COMPANIONS}; send a .zip of the scene")
+    folder = scene.resolve().parent
+    return [
+        (path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name, path)
+        for path in (file.resolve() for file in files)
+    ]
+
+
+def _progress_line(label: str) -> Callable[[BakeBody | RenderBody], None]:
+    """A function that shows progress in one line of stderr."""
+
+    def report(body: BakeBody | RenderBody) -> None:
+        left_s = body["seconds_left"]
+        left = "" if left_s is None else f", {left_s:.0f} s left"
+        end = "\n" if body["state"] not in ("queued", "running") else ""
+        sys.stderr.write(f"\r{label}: {body['state']} {100 * body['progress']:3.0f} %{left:16}{end}")
+        sys.stderr.flush()
+
+    return report
