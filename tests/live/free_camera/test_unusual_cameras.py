@@ -1,6 +1,6 @@
 """Free cameras where nobody puts one: in walls, in glass, in closed rooms, in a plane, at any field of view.
 
-All scenes have Lambert surfaces of albedo 0.5 under uniform light of radiance 1, so that radiance is known.
+All scenes have Lambert surfaces of albedo 0.5 under uniform light of radiance 1.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def test_the_field_of_view_has_its_whole_range(plane, degrees):
     assert (np.abs(outside - 1) > 1e-5).any(axis=1).sum() <= 2  # the floor may be smaller than a pixel
 
 
-def test_a_plane_is_seen_from_both_sides_and_not_from_within(plane):
+def test_a_plane_has_two_sides_and_no_thickness(plane):
     down = looking((0.3, 1e-6, 0.2), (1, 0, 0), (0, 0, -1), (0, 1, 0))
     below = looking((0.3, -1e-6, 0.2), (1, 0, 0), (0, 0, 1), (0, -1, 0))
     for camera in (down, below):
