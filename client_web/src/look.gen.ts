@@ -175,7 +175,7 @@ export const RANGES = {
   background: { color: { minimum: 0, maximum: 10000 }, blur: { minimum: 2, maximum: 60 } },
   transport: { bounces: { minimum: 0, maximum: 24 } },
   display: { exposure: { minimum: -20, maximum: 20 } },
-  light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000 }, position: { minimum: -1000000, maximum: 1000000 }, direction: { minimum: -1000000, maximum: 1000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 0.0001, maximum: 10000 }, cone: { minimum: 0, maximum: 90 } },
+  light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000000000 }, position: { minimum: -1000000000, maximum: 1000000000 }, direction: { minimum: -1000000000, maximum: 1000000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 1e-08, maximum: 100000000 }, cone: { minimum: 0, maximum: 90 } },
   glass: { color: { minimum: 0, maximum: 1 }, absorption: { minimum: 0, maximum: 1000000 }, roughness: { minimum: 0, maximum: 1 }, ior: { minimum: 1, maximum: 4 } },
   term: { color: { minimum: 0, maximum: 10000 } },
 } as const;

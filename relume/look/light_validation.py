@@ -28,7 +28,7 @@ LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; m
     "position": (-MAX_METERS, MAX_METERS),
     "direction": (-MAX_METERS, MAX_METERS),
     "rotation": (-360.0, 360.0),
-    "size": (1e-4, 1e4),
+    "size": (1e-8, 1e8),
     "cone": (0.0, 90.0),
 }
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from relume.core.color import luminance
 from relume.lights.spherical_triangles import TriangleLights
-from relume.probes.mesh_lattice import NODES_PER_PROBE, PlacedProbes
+from relume.probes.mesh_lattice import NODES_PER_PROBE, PlacedProbes, positions_in_faces
 from relume.probes.triangle_grids import (
     GridSteps,
     ProbeDensity,
@@ -112,10 +112,9 @@ def _node_areas(geometry: SceneBuffers, probe_grid: ProbeGrid, steps: GridSteps)
 
 def _node_positions(geometry: SceneBuffers, steps: GridSteps) -> F64:
     """Positions of nodes, meters; the centroid of faces with one row. (n, 3)"""
-    a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].astype(np.float64).transpose(1, 0, 2)
     is_single_row = steps.rows == 1
-    u, v = (np.where(is_single_row, 1 / 3, step / steps.rows)[:, None] for step in (steps.i, steps.j))
-    return np.asarray((1 - u - v) * a + u * b + v * c)
+    u, v = (np.where(is_single_row, 1 / 3, step / steps.rows) for step in (steps.i, steps.j))
+    return positions_in_faces(geometry, steps.grid // 2, u, v)
 
 
 def _neighbor_pairs(placed_probes: PlacedProbes) -> NDArray[np.int64]:

@@ -32,6 +32,7 @@ F64 = NDArray[np.float64]
 _MERGE_DISTANCE = 0.35  # of the spacing: nodes within it are one probe
 _SAME_NODE_DISTANCE = 1e-3  # of the spacing: nodes within it are one lattice node
 _SAME_NODE_NORMAL_STEPS = 50  # quantization steps of normal components; equal normals merge
+_NORMAL_STEP_EXCESS = 0.237  # steps: else normals at 60° to an axis lie between two steps, and rounding decides
 _NORMAL_WEIGHT = 1.5  # distance, in spacings, of normals that differ by a radian
 _POSITION_BITS = 20  # per coordinate: positions are quantized to a millionth of the scene
 _U64 = np.uint64
@@ -57,25 +58,29 @@ class NodeTable(NamedTuple):
     """Nodes of all grids, before merging.
 
     Attributes:
-        surface_points: positions and normals. material, side, component: material, side and component of each.
+        surface_points: where rays start, and normals.
+        position: on the triangles, from the least corner of the bounding box, meters. Ray origins have float32's
+            rounding far from the origin and offsets along the normals of single faces.
+        material, side, component: material, side and component of each.
         spacing: spacing of the probes around each, meters; ratios are powers of two.
         is_candidate: True if it may be a probe; the others are midpoints of coarser grids.
-        corner, extent: from `bounding_cube`.
+        extent: longest side of the bounding box, meters.
     """
 
     surface_points: SurfacePoints
+    position: Shaped[F64, "n 3"]
     material: Shaped[NDArray[np.uint16], " n"]
     side: Shaped[NDArray[np.uint8], " n"]
     component: Shaped[NDArray[np.int32], " n"]
     spacing: Shaped[F64, " n"]
     is_candidate: Shaped[NDArray[np.bool_], " n"]
-    corner: Shaped[F32, " 3"]
     extent: float
 
     def rows(self, indices: NDArray[np.intp]) -> NodeTable:
         """Select nodes."""
         return self._replace(
             surface_points=self.surface_points.rows(indices),
+            position=self.position[indices],
             material=self.material[indices],
             side=self.side[indices],
             component=self.component[indices],
@@ -157,7 +162,7 @@ def _features(grid_nodes: NodeTable, spacing: float) -> F64:
     """Coordinates, in spacings, in which nearest probes are searched: position, normal, material, side, component. (n,
     11)
     """
-    position = grid_nodes.surface_points.position.astype(np.float64) / spacing
+    position = grid_nodes.position / spacing
     separation = MATERIAL_SEPARATION * np.column_stack([grid_nodes.material, grid_nodes.side])
     component_offset = np.random.default_rng(1).normal(size=(int(grid_nodes.component.max()) + 1, 3))
     component_offset *= _COMPONENT_SEPARATION / np.sqrt(2) / np.linalg.norm(component_offset, axis=1, keepdims=True)
@@ -171,15 +176,9 @@ def _features(grid_nodes: NodeTable, spacing: float) -> F64:
     )
 
 
-def bounding_cube(surface_points: SurfacePoints) -> tuple[Shaped[F32, " 3"], float]:
-    """Return the least corner of the bounding box, and its longest side, meters. surface_points: at least one"""
-    position = surface_points.position
-    return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
-
-
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _key_kernel(  # type: ignore[no-untyped-def]
-    positions_normals, material, side, level, size, corner, normal_steps, start, stop, position_key, attribute_key
+    positions_normals, material, side, level, size, normal_steps, start, stop, position_key, attribute_key
 ):
     """Compute the keys of nodes [start, stop). size: size of the boxes within which nodes merge. (n,) float64"""
     position, normal = positions_normals
@@ -187,10 +186,12 @@ def _key_kernel(  # type: ignore[no-untyped-def]
     for i in range(start, stop):
         position_code, normal_code = np.uint64(0), np.int64(0)
         for axis in range(3):
-            box = np.uint64(math.floor(np.float64(position[i, axis] - corner[axis]) / size[i]))
+            box = np.uint64(math.floor(position[i, axis] / size[i]))
             position_code = (position_code << np.uint64(_POSITION_BITS)) | box
             normal_code = (
-                normal_code * base + np.int64(np.rint(normal[i, axis] * np.float32(normal_steps))) + normal_steps
+                normal_code * base
+                + np.int64(np.rint(normal[i, axis] * np.float32(normal_steps + _NORMAL_STEP_EXCESS)))
+                + normal_steps
             )
         position_key[i] = position_code
         attribute_key[i] = (
@@ -204,17 +205,15 @@ def _keys(
     grid_nodes: NodeTable, merge_distance: float, normal_steps: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
     """Two numbers that are equal for nodes that merge. (n,) uint64 each"""
-    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
-    size = np.maximum(merge_distance * grid_nodes.spacing, extent / ((1 << _POSITION_BITS) - 1))
+    size = np.maximum(merge_distance * grid_nodes.spacing, grid_nodes.extent / ((1 << _POSITION_BITS) - 1))
     position_key, attribute_key = np.empty(len(size), np.uint64), np.empty(len(size), np.uint64)
     args = (
-        (surface_points.position, surface_points.normal),
+        (grid_nodes.position, grid_nodes.surface_points.normal),
         grid_nodes.material,
         grid_nodes.side,
         level,
         size,
-        corner,
         normal_steps,
     )
     parallel_for_chunks(lambda start, stop: _key_kernel(*args, start, stop, position_key, attribute_key), len(size))
@@ -225,7 +224,6 @@ def _merge_nodes(
     grid_nodes: NodeTable, merge_distance: float, normal_steps: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return one node of each merged group, in Morton order, and the group of each node."""
-    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     position_key, attribute_key = _keys(grid_nodes, merge_distance, normal_steps)
     # stable sort: of equal nodes a candidate comes first, that with the lowest index
     order = np.lexsort((~grid_nodes.is_candidate, attribute_key, position_key))
@@ -237,9 +235,7 @@ def _merge_nodes(
         ]
     )
     first, group = order[is_new], np.cumsum(is_new) - 1
-    fine_position = np.floor((surface_points.position[first] - corner) / (extent / ((1 << _POSITION_BITS) - 1))).astype(
-        np.uint64
-    )
+    fine_position = (grid_nodes.position[first] / (grid_nodes.extent / ((1 << _POSITION_BITS) - 1))).astype(np.uint64)
     in_order = np.lexsort((_morton_code(fine_position), grid_nodes.material[first]))
     rank = np.empty(len(first), np.intp)
     rank[in_order] = np.arange(len(first))

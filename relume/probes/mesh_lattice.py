@@ -11,6 +11,7 @@ edges, and a mesh finer than the spacing has fewer probes than corners. Nodes th
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -24,7 +25,6 @@ from relume.core.errors import PlanError
 from relume.probes.lattice_nodes import (
     LatticeNodes,
     NodeTable,
-    bounding_cube,
     build_nodes,
     num_representatives,
     representative_nodes,
@@ -47,13 +47,14 @@ F64 = NDArray[np.float64]
 MAX_PROBES = 2_000_000
 MAX_ROWS = 255  # of the grid in one face
 _NORMAL_STEPS, _MIN_NORMAL_STEPS = 3, 1  # quantization steps of normal components; equal normals merge
-_NUM_TRIALS, _MAX_TRIALS = 6, 40  # after the first trials fewer probes are accepted, and each trial is coarser
-_COARSENING = 1.25
-_MAX_SPACING = 16.0  # in longest edges: beyond it no more nodes merge
+_SPACINGS_PER_OCTAVE = 32  # that are tried
+_FINEST_SPACING = 0.5  # of that at which each probe has its area
+_COARSEST_SPACING = 16.0  # in longest edges: beyond it no more nodes merge
+_ROW_TOLERANCE = 1e-3  # rows: else rounding decides where a whole number of spacings fits an edge
 NODES_PER_PROBE = 8  # on average; more in thin faces
 _ENDS: tuple[tuple[Literal["left", "right"], int], ...] = (("left", 0), ("right", 1))  # of equal edges in sorted order
 _NARROW_ASPECT = 8.0  # length over width
-_COUNT_TOLERANCE = 0.05  # of the requested number of probes
+_COUNT_TOLERANCE = 0.05  # of the requested number of probes, which may be exceeded by that
 
 
 @dataclass(frozen=True)
@@ -93,47 +94,10 @@ def place_probes(
     finest, coarsest = density.face_extremes()
     paired_faces = paired_faces_of(geometry, edges)
     finest, coarsest = np.minimum(finest, finest[paired_faces]), np.maximum(coarsest, coarsest[paired_faces])
-    longest, count = edges.max(axis=1) / 2.0**finest, is_open.sum(axis=1)
-    spacing, node_limit = math.sqrt(total / num_probes), max_grid_nodes(len(geometry.faces), num_probes)
-
-    def rows_at(spacing: float) -> NDArray[np.int64]:
-        return _num_rows(longest, spacing, (coarsest - finest).astype(np.int64))
-
-    def exceeds_limit(spacing: float) -> bool:
-        return int((num_nodes(rows_at(spacing)) * count).sum()) > node_limit
-
-    while exceeds_limit(spacing) and spacing < longest.max():
-        spacing *= _COARSENING
     surfaces = _PlacementInput(geometry, geometry.face_normals, mesh_components(geometry), is_open, density, finest)
-    rows, normal_steps = rows_at(spacing), _NORMAL_STEPS
-    probe_grid, grid_nodes = _make_grids(surfaces, rows, spacing)
-    # exponent of the spacing in the number of probes; the previous trial
-    power, previous_count, previous_spacing = -2.0, 0, spacing
-    for trial in range(_MAX_TRIALS):
-        # if normals alone make too many nodes
-        normal_steps = max(_MIN_NORMAL_STEPS, _NORMAL_STEPS - max(0, trial - _NUM_TRIALS))
-        num_merged = num_representatives(grid_nodes, normal_steps)
-        ratio = num_merged / num_probes
-        if abs(ratio - 1) < _COUNT_TOLERANCE or (ratio < 1 and trial >= _NUM_TRIALS):
-            break
-        if previous_count and num_merged != previous_count and spacing != previous_spacing:
-            power = min(max(math.log(num_merged / previous_count) / math.log(spacing / previous_spacing), -2.0), -0.25)
-        finer_spacing = spacing * ratio ** (-1 / power) * (1 if trial < _NUM_TRIALS else _COARSENING)
-        if (
-            ratio < 1
-            and exceeds_limit(finer_spacing)
-            and exceeds_limit(finer_spacing := math.sqrt(spacing * finer_spacing))
-        ):
-            break
-        previous_count, previous_spacing, spacing = (
-            num_merged,
-            spacing,
-            min(finer_spacing, _MAX_SPACING * float(longest.max())),
-        )
-        if np.array_equal(rows, new_rows := rows_at(spacing)):  # the mesh is finer than the spacing: only corners
-            grid_nodes = grid_nodes._replace(spacing=grid_nodes.spacing * (spacing / previous_spacing))
-        else:
-            rows, (probe_grid, grid_nodes) = new_rows, _make_grids(surfaces, new_rows, spacing)
+    grids = _Grids(surfaces, edges.max(axis=1) / 2.0**finest, (coarsest - finest).astype(np.int64))
+    spacing, normal_steps = _find_spacing(grids, _FINEST_SPACING * math.sqrt(total / num_probes), num_probes)
+    probe_grid, grid_nodes = grids.at(spacing)
     probe_nodes = representative_nodes(grid_nodes, normal_steps)
     lattice_nodes, node_index = build_nodes(grid_nodes, probe_nodes, probe_grid)
     probes = grid_nodes.surface_points.rows(probe_nodes)._replace(seed=np.arange(len(probe_nodes), dtype=np.uint32))
@@ -180,13 +144,6 @@ def max_grid_nodes(num_faces: int, num_probes: int) -> int:
     return 6 * num_faces + NODES_PER_PROBE * num_probes
 
 
-def _num_rows(longest: F64, spacing: float, power_range: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number of rows of grids; a multiple of the coarsest step."""
-    rows = np.clip(np.ceil(longest / spacing), 1, MAX_ROWS).astype(np.int64)
-    step = 1 << np.minimum(power_range, np.log2(rows).astype(np.int64))
-    return np.asarray(np.minimum(-(-rows // step), MAX_ROWS // step) * step)
-
-
 class _PlacementInput(NamedTuple):
     """Scene that probes are placed on. normals, component, finest_power: normals, component and finest power of faces,
     see `ProbeDensity.face_extremes`.
@@ -200,6 +157,77 @@ class _PlacementInput(NamedTuple):
     finest_power: NDArray[np.int8]
 
 
+class _Grids:
+    """The grids of a scene at any spacing.
+
+    Args:
+        placement_input: the scene. longest: longest edges of the faces in units of the finest relative spacing on
+            each, meters. power_range: of the relative spacings on each face, powers of two.
+    """
+
+    def __init__(self, placement_input: _PlacementInput, longest: F64, power_range: NDArray[np.int64]) -> None:
+        self._input, self._longest, self._power_range = placement_input, longest, power_range
+        self._made: tuple[NDArray[np.int64], float, ProbeGrid, NodeTable] | None = None
+
+    @property
+    def num_faces(self) -> int:
+        """Number of faces of the scene."""
+        return len(self._longest)
+
+    @property
+    def coarsest_spacing(self) -> float:
+        """Spacing beyond which no more nodes merge, meters."""
+        return _COARSEST_SPACING * float(self._longest.max())
+
+    def num_rows(self, spacing: float) -> NDArray[np.int64]:
+        """Return the number of rows on each face, a multiple of the coarsest step. spacing: meters"""
+        rows = np.clip(np.ceil(self._longest / spacing - _ROW_TOLERANCE), 1, MAX_ROWS).astype(np.int64)
+        step = 1 << np.minimum(self._power_range, np.log2(rows).astype(np.int64))
+        return np.asarray(np.minimum(-(-rows // step), MAX_ROWS // step) * step)
+
+    def num_nodes(self, spacing: float) -> int:
+        """Count the nodes of all grids, before merging. spacing: meters"""
+        return int((num_nodes(self.num_rows(spacing)) * self._input.is_open.sum(axis=1)).sum())
+
+    def at(self, spacing: float) -> tuple[ProbeGrid, NodeTable]:
+        """Place the nodes; lattice nodes are not assigned yet. spacing: meters"""
+        rows = self.num_rows(spacing)
+        if self._made is not None and np.array_equal(self._made[0], rows):  # often only corners
+            _, made_spacing, probe_grid, grid_nodes = self._made
+            return probe_grid, grid_nodes._replace(spacing=grid_nodes.spacing * (spacing / made_spacing))
+        probe_grid, grid_nodes = _make_grids(self._input, rows, spacing)
+        self._made = rows, spacing, probe_grid, grid_nodes
+        return probe_grid, grid_nodes
+
+
+def _find_spacing(grids: _Grids, finest: float, num_probes: int) -> tuple[float, int]:
+    """Find the finest spacing with about `num_probes` probes, and the quantization steps of normals.
+
+    Bisection compares counts only, so that one node more or less seldom changes the spacing.
+
+    Args:
+        grids: at any spacing. finest: least spacing, meters. num_probes: exceeded by at most `_COUNT_TOLERANCE`, unless
+            the scene has more surfaces that share no probes.
+    """
+    node_limit = max_grid_nodes(grids.num_faces, num_probes)
+    num_spacings = math.ceil(_SPACINGS_PER_OCTAVE * max(math.log2(grids.coarsest_spacing / finest), 0))
+
+    def spacing_of(index: int) -> float:
+        return finest * 2.0 ** (index / _SPACINGS_PER_OCTAVE)
+
+    def fits(index: int, normal_steps: int) -> bool:
+        if grids.num_nodes(spacing_of(index)) > node_limit:
+            return False
+        _, grid_nodes = grids.at(spacing_of(index))
+        return num_representatives(grid_nodes, normal_steps) <= (1 + _COUNT_TOLERANCE) * num_probes
+
+    normal_steps = _NORMAL_STEPS
+    while normal_steps > _MIN_NORMAL_STEPS and not fits(num_spacings, normal_steps):
+        normal_steps -= 1
+    index = bisect_left(range(num_spacings), True, key=lambda index: fits(index, normal_steps))
+    return spacing_of(index), normal_steps
+
+
 def _make_grids(
     placement_input: _PlacementInput, rows: NDArray[np.int64], spacing: float
 ) -> tuple[ProbeGrid, NodeTable]:
@@ -211,6 +239,8 @@ def _make_grids(
     uv = np.column_stack([steps.i / steps.rows, steps.j / steps.rows]).astype(np.float32)
     normal = normals[face] * np.where(side == 0, 1, -1)[:, None].astype(np.float32)
     surface_points = surface_at(geometry, Hits(face, uv, np.ones(len(face), np.float32)), -normal).points
+    position = positions_in_faces(geometry, face, steps.i / steps.rows, steps.j / steps.rows)
+    position -= position.min(axis=0)
     power, node_finest = density.at(steps), finest_power[face]
     step = 1 << (power - node_finest).astype(np.int64)
     step = np.minimum(step, steps.rows & -steps.rows)  # the largest power of two that divides the rows
@@ -219,8 +249,16 @@ def _make_grids(
     probe_grid = ProbeGrid(num_rows, first_nodes(num_rows), np.empty(0, np.uint32))
     face_attributes = geometry.face_material[face].astype(np.uint16), side, component[face]
     return probe_grid, NodeTable(
-        surface_points, *face_attributes, node_spacing, is_candidate, *bounding_cube(surface_points)
+        surface_points, position, *face_attributes, node_spacing, is_candidate, max(float(position.max()), 1e-30)
     )
+
+
+def positions_in_faces(
+    geometry: SceneBuffers, face: Shaped[NDArray[np.integer], " n"], u: Shaped[F64, " n"], v: Shaped[F64, " n"]
+) -> Shaped[F64, "n 3"]:
+    """Points on faces, meters. u, v: barycentric, of the second and third corner."""
+    a, b, c = geometry.positions[geometry.faces[face]].astype(np.float64).transpose(1, 0, 2)
+    return np.asarray((1 - u - v)[:, None] * a + u[:, None] * b + v[:, None] * c)
 
 
 def make_corner_grid(is_open: NDArray[np.bool_]) -> ProbeGrid:

@@ -11,10 +11,10 @@ import numpy as np
 
 from relume.core.errors import Description, ParameterError, count_text
 from relume.scene.model import Camera, Scene
+from relume.scene.validate import MAX_METERS
 
 MAX_NAME = 80
 MIN_YFOV, MAX_YFOV = 1.0, 170.0  # degrees
-MAX_DISTANCE_M = 1e6  # meters from the origin; beyond, float32 rays of neighboring pixels are equal
 _FIELDS, _OPTIONAL_FIELD = ("name", "to_world", "yfov"), "near"
 # largest allowed deviation from right angles; deviation below which axes are kept as they are
 _ANGLE_TOLERANCE, _RIGID_TOLERANCE = 1e-3, 1e-8
@@ -60,8 +60,8 @@ def make_custom_camera(name: str, to_world: Sequence[float], yfov: float, near: 
     _check_name(name)
     if not (math.isfinite(yfov) and MIN_YFOV <= yfov <= MAX_YFOV):
         raise ParameterError("yfov", yfov, f"a vertical field of view of {MIN_YFOV:g} to {MAX_YFOV:g} degrees")
-    if not (math.isfinite(near) and 0 <= near <= MAX_DISTANCE_M):
-        raise ParameterError("near", near, f"0 to {MAX_DISTANCE_M:,.0f} m")
+    if not (math.isfinite(near) and 0 <= near <= MAX_METERS):
+        raise ParameterError("near", near, f"0 to {MAX_METERS:,.0f} m")
     return CustomCamera(name, _rigid(to_world), float(yfov), float(near))
 
 
@@ -104,8 +104,8 @@ def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
     frame = np.array(to_world, np.float64).reshape(4, 4)
     if not np.isfinite(frame).all() or not np.array_equal(frame[3], (0, 0, 0, 1)):
         raise ParameterError("to_world", list(to_world), allowed)
-    if np.abs(frame[:3, 3]).max() > MAX_DISTANCE_M:
-        allowed = f"a camera position at most {MAX_DISTANCE_M:,.0f} m from the origin"
+    if np.abs(frame[:3, 3]).max() > MAX_METERS:
+        allowed = f"a camera position at most {MAX_METERS:,.0f} m from the origin"
         raise ParameterError("to_world", frame[:3, 3].tolist(), allowed)
     max_value = np.abs(frame[:3, :3]).max()  # checked first: squares of larger values overflow
     lengths = np.linalg.norm(frame[:3, :3], axis=0) if max_value <= 1e12 else np.full(3, max_value)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from relume.core.errors import ParameterError
-from relume.scene.custom_camera import MAX_DISTANCE_M, make_custom_camera, read_custom_camera, with_cameras
+from relume.scene.custom_camera import make_custom_camera, read_custom_camera, with_cameras
 from relume.scene.examples.catalog import built_in
+from relume.scene.validate import MAX_METERS
 
 POSE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
 
@@ -49,7 +50,7 @@ def test_scale_is_removed_and_the_text_is_stable(scale: float) -> None:
         (changed(3, math.inf), "16 finite numbers"),
         (changed(15, 2.0), "the last four"),
         (changed(12, 0.1), "the last four"),
-        (changed(3, 2 * MAX_DISTANCE_M), "from the origin"),
+        (changed(3, 2 * MAX_METERS), "from the origin"),
         (changed(5, 0.0), "with a length"),
         (changed(5, 1e308), "with a length"),
         (changed(1, 0.5), "right angles"),

@@ -18,12 +18,13 @@ from relume.assets.environments.read_environment import read_environment
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
-from relume.scene.validate import MAX_EMISSION, MAX_METERS
+from relume.scene.validate import MAX_METERS
 from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 MAX_INTENSITY = 1e30
+_MAX_RADIANCE = 1e6  # of domes
 UNIFORM_SIZE = (2, 4)  # texels of a dome without an image
 DOMES = ("DomeLight", "DomeLight_1")
 KINDS = ("DistantLight", "SphereLight", "DiskLight", "RectLight", "CylinderLight", *DOMES)
@@ -221,7 +222,7 @@ class UsdLightReader:
         if prim.GetAttribute("inputs:texture:format").Get(self._time) not in (None, "automatic", "latlong"):
             self._warnings.append(unsupported(f"The texture of {label} is read as equirectangular."))
         pixels = image.radiance if image is uniform else _rotate(image.radiance, to_world[:3, :3] @ self._pole(prim))
-        pixels = np.minimum(pixels * emitted.astype(np.float32), np.float32(MAX_EMISSION))
+        pixels = np.minimum(pixels * emitted.astype(np.float32), np.float32(_MAX_RADIANCE))
         if pixels.any():
             self.environment = Environment(name, pixels, image.warnings)
         else:

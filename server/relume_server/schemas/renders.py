@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag
 
 from relume.look.interpolate import InterpolationMode
 from relume.output.exr.layers import Layering
+from relume.scene.validate import MAX_METERS
 from relume_server.schemas.base import Body, Id, Name
 from relume_server.schemas.cameras import CameraFrame
 from relume_worker.job_state import JobState
@@ -22,7 +23,7 @@ MAX_LISTED_BYTES = 16 << 20
 Duration = Annotated[float, Field(ge=1e-3, le=1e6, allow_inf_nan=False)]
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
 TurntableSubject = Literal["camera", "object", "environment"]
-Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Metres = Annotated[float, Field(ge=-MAX_METERS, le=MAX_METERS, allow_inf_nan=False)]
 
 
 class Turntable(Body):

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.probes.lattice_nodes import (
+    _NORMAL_STEP_EXCESS,
     _POSITION_BITS,
     _U64,
     NodeTable,
     _keys,
-    bounding_cube,
     num_representatives,
     representative_nodes,
 )
@@ -26,11 +26,11 @@ def keys_numpy(
     Returns:
         Two keys that coinciding nodes have in common. (n,) uint64 each
     """
-    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
-    size = np.maximum(merge_distance * grid_nodes.spacing, extent / ((1 << _POSITION_BITS) - 1))
-    box = np.floor((surface_points.position - corner) / size[:, None]).astype(np.uint64)
-    normal_code = np.rint(surface_points.normal * np.float32(normal_steps)).astype(np.int64) + normal_steps
+    size = np.maximum(merge_distance * grid_nodes.spacing, grid_nodes.extent / ((1 << _POSITION_BITS) - 1))
+    box = np.floor(grid_nodes.position / size[:, None]).astype(np.uint64)
+    normal_code = np.rint(grid_nodes.surface_points.normal * np.float32(normal_steps + _NORMAL_STEP_EXCESS))
+    normal_code = normal_code.astype(np.int64) + normal_steps
     base = 2 * normal_steps + 1
     kind = (((normal_code[:, 0] * base + normal_code[:, 1]) * base + normal_code[:, 2]) * 2 + grid_nodes.side).astype(
         np.uint64
@@ -47,7 +47,9 @@ def nodes(num, seed=3):
     points = SurfacePoints(position.astype(np.float32), normal, normal[:, [1, 2, 0]], np.zeros(num, np.uint32))
     material, side = rng.integers(0, 2, num).astype(np.uint16), rng.integers(0, 2, num).astype(np.uint8)
     spacing, piece = 0.3 * 2.0 ** rng.integers(0, 3, num), np.zeros(num, np.int32)
-    return NodeTable(points, material, side, piece, spacing, rng.random(num) < 0.8, *bounding_cube(points))
+    from_corner = points.position.astype(np.float64) - points.position.min(axis=0)
+    is_candidate, extent = rng.random(num) < 0.8, float(from_corner.max())
+    return NodeTable(points, from_corner, material, side, piece, spacing, is_candidate, extent)
 
 
 def test_keys_equal_numpy():

@@ -15,7 +15,7 @@ interface Props {
   light: Light;
 }
 
-const MOST_WATTS = 1e9;
+const MOST_WATTS = 1e13;
 
 function Power({ name, light }: Props) {
   const { label, watts, lumens } = unitsOf(light);
