@@ -12,6 +12,7 @@ from platformdirs import user_data_dir
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from relume_server.root_path import parse_root_path
 from relume_worker.idle_timer import DEFAULT_IDLE_S
 
 GIB = 1024**3
@@ -64,6 +65,9 @@ class Settings(BaseSettings):
     database: str = Field(default="", description="SQLAlchemy URL; empty: relume.db in the data directory")
     host: str = Field(default="127.0.0.1", description="address to listen on")
     port: int = Field(default=8420, ge=0, le=65535, description="port to listen on")
+    root_path: Annotated[str, AfterValidator(parse_root_path)] = Field(
+        default="", description="path at which a proxy publishes the server, such as /relume"
+    )
     scheduler: str | None = Field(default=None, description="Dask scheduler, tcp://…; unset: an embedded worker")
     ocio: Config = Field(
         default_factory=lambda: os.environ.get("OCIO") or None,
@@ -116,7 +120,7 @@ class Settings(BaseSettings):
         default=False, description="whether clients use HTTPS only: Secure cookies, Strict-Transport-Security"
     )
     trusted_proxies: list[ProxyAddress] = Field(
-        default=[], description="addresses, networks or names of proxies trusted for X-Forwarded-For, as JSON list"
+        default=[], description="addresses, networks or names of proxies trusted for X-Forwarded-…, as JSON list"
     )
     user_header: str = Field(default="", description="header with the user's name from these proxies; empty: none")
     proxy_role: RoleName = Field(default="view", description="role of users named by a proxy")
