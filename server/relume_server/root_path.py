@@ -1,8 +1,8 @@
 """Serve below a path prefix, such as /relume, at which a proxy publishes the server.
 
-Pure ASGI, before all middlewares that compare paths: behind it, paths begin at the root of the server, whether the proxy
-has removed the prefix or not. Bodies name paths of the server without the prefix, because only browsers know it behind
-a proxy that says nothing; `Location`, the cookie's path and the OpenAPI description have it.
+Pure ASGI, before all middlewares that compare paths: behind it, paths begin at the root of the server, whether the
+proxy has removed the prefix or not. Bodies name paths of the server without the prefix, because only browsers know it
+if the proxy sends no header; `Location`, the cookie's path and the OpenAPI description have it.
 """
 
 from __future__ import annotations

@@ -35,6 +35,12 @@ def _machine_bytes() -> int:
     return machine_bytes()
 
 
+def _editor_folder() -> Path:
+    """The built editor: in a wheel beside this module, else of the checkout."""
+    installed = Path(__file__).with_name("editor")
+    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "client_web" / "dist"
+
+
 _HOST_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9_]([A-Za-z0-9_.-]{0,251}[A-Za-z0-9_])?")
 
 
@@ -75,9 +81,7 @@ class Settings(BaseSettings):
         description="OpenColorIO config: .ocio or .ocioz file, ocio://… for a built-in config, or none; unset: OCIO",
     )
     ocio_space: str | None = Field(default=None, description="the config's name of linear Rec. 709, if detection fails")
-    client: Path = Field(
-        default=Path(__file__).resolve().parents[2] / "client_web" / "dist", description="directory of the built editor"
-    )
+    client: Path = Field(default_factory=_editor_folder, description="directory of the built editor")
     cache_bytes: int = Field(
         default_factory=_default_cache_bytes, gt=0, description="budget of the cache of results computed from bakes"
     )

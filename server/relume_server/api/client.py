@@ -55,7 +55,7 @@ class Client(StaticFiles):
 
 
 def _redirect_to_page(scope: Scope) -> Response:
-    """Redirect to the page, which finds its files beside itself; relative, because a proxy may have removed a prefix."""
+    """Redirect to the page, which finds its files beside itself; relative: a proxy may have removed a prefix."""
     query = scope["query_string"].decode("latin-1")
     page = "../" * (scope["path"].count("/") - 1) or "./"
     return RedirectResponse(f"{page}?{query}" if query else page)
