@@ -2,7 +2,7 @@
 
 Pure ASGI, before all middlewares that compare paths: behind it, paths begin at the root of the server, whether the
 proxy has removed the prefix or not. Bodies name paths of the server without the prefix, because only browsers know it
-if the proxy sends no header; `Location`, the cookie's path and the OpenAPI description have it.
+if the proxy sends no header; `Location`, `Link`, the cookie's path and the OpenAPI description have it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def parse_root_path(text: str) -> str:
 
 
 class RootPath:
-    """Middleware that removes the prefix from paths and adds it to `Location`.
+    """Middleware that removes the prefix from paths and adds it to `Location` and `Link`.
 
     Args:
         app: application at the root. root_path: prefix of the settings; empty: the one that a trusted proxy sends.
@@ -75,7 +75,7 @@ class RootPath:
 
 
 def _with_prefix(prefix: str, send: Send) -> Send:
-    """Add the prefix to paths of the server in `Location`, also to those with scheme and host."""
+    """Add the prefix to paths of the server in `Location`, also to those with scheme and host, and in `Link`."""
 
     async def send_with_prefix(message: Message) -> None:
         if message["type"] == "http.response.start":
@@ -84,6 +84,8 @@ def _with_prefix(prefix: str, send: Send) -> Send:
             path = urlsplit(location)._replace(scheme="", netloc="").geturl()
             if path.startswith("/"):
                 headers["location"] = prefix + path
+            if (link := headers.get("link", "")).startswith("</"):
+                headers["link"] = f"<{prefix}{link[1:]}"
         await send(message)
 
     return send_with_prefix

@@ -65,12 +65,15 @@ class TestSetting:
         answer = client.get("/relume?scene=a%20b", follow_redirects=False)
         assert (answer.status_code, answer.headers["location"]) == (308, "/relume/?scene=a%20b")
 
-    def test_location_has_the_prefix_and_bodies_do_not(self, client: TestClient) -> None:
+    def test_location_and_link_have_the_prefix(self, client: TestClient) -> None:
         answer = client.put("/relume/api/looks/Red/", json=LOOK, follow_redirects=False)
         assert (answer.status_code, answer.headers["location"]) == (307, "/relume/api/looks/Red")
         assert client.put("/relume/api/looks/Red", json=LOOK).status_code == 201
         (look,) = client.get("/relume/api/looks").json()
-        assert look["thumbnail"] is None or look["thumbnail"].startswith("/api/looks/Red/")
+        assert look["name"] == "Red"
+        assert client.put("/relume/api/looks/Blue", json=LOOK).status_code == 201
+        link = client.get("/relume/api/looks?limit=1").headers["link"]
+        assert link.startswith("</relume/api/looks?limit=1&after=")
 
     def test_openapi_names_the_prefix(self, client: TestClient) -> None:
         assert client.get("/relume/api/openapi.json").json()["servers"] == [{"url": "/relume"}]
