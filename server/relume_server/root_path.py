@@ -7,7 +7,6 @@ if the proxy sends no header; `Location`, `Link`, the cookie's path and the Open
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -17,28 +16,12 @@ from starlette.datastructures import MutableHeaders
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from relume_server.settings import parse_root_path
+
 if TYPE_CHECKING:
     from relume_server.auth.identity import Identity
 
 FORWARDED = "x-forwarded-prefix"
-_SEGMENT = r"/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~@:+=,%-]+"
-_ROOT_PATH = re.compile(rf"(?!/(?:api|assets)/?$)(?:{_SEGMENT})+/?")
-_MAX_LENGTH = 255
-
-
-def parse_root_path(text: str) -> str:
-    """Prefix without a slash at its end; empty for "" and "/".
-
-    `/api` and `/assets` alone are refused: with them, `/api/scenes` could be a path with or without prefix.
-
-    Raises:
-        ValueError: not a path of plain segments. `//host` would be another host in `Location`.
-    """
-    if text in ("", "/"):
-        return ""
-    if len(text) > _MAX_LENGTH or _ROOT_PATH.fullmatch(text) is None:
-        raise ValueError("a path such as /relume, of letters, digits and ._~@:+=,%- (not /api or /assets)")
-    return text.removesuffix("/")
 
 
 class RootPath:

@@ -12,7 +12,6 @@ from platformdirs import user_data_dir
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from relume_server.root_path import parse_root_path
 from relume_worker.idle_timer import DEFAULT_IDLE_S
 
 GIB = 1024**3
@@ -56,6 +55,26 @@ def _check_proxy(text: str) -> str:
 
 ProxyAddress = Annotated[str, AfterValidator(_check_proxy)]
 """An IP address, a network such as 10.0.0.0/8, or a host name."""
+
+
+_SEGMENT = r"/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~@:+=,%-]+"
+_ROOT_PATH = re.compile(rf"(?!/(?:api|assets)/?$)(?:{_SEGMENT})+/?")
+_MAX_ROOT_PATH = 255
+
+
+def parse_root_path(text: str) -> str:
+    """Prefix without a slash at its end; empty for "" and "/".
+
+    `/api` and `/assets` alone are refused: with them, `/api/scenes` could be a path with or without prefix.
+
+    Raises:
+        ValueError: not a path of plain segments. `//host` would be another host in `Location`.
+    """
+    if text in ("", "/"):
+        return ""
+    if len(text) > _MAX_ROOT_PATH or _ROOT_PATH.fullmatch(text) is None:
+        raise ValueError("a path such as /relume, of letters, digits and ._~@:+=,%- (not /api or /assets)")
+    return text.removesuffix("/")
 
 
 Config = Annotated[str | None, AfterValidator(lambda text: None if text == "none" else text)]

@@ -9,8 +9,7 @@ from fastapi.testclient import TestClient
 from pydantic import ValidationError
 from starlette.websockets import WebSocketDisconnect
 
-from relume_server.root_path import parse_root_path
-from relume_server.settings import Settings
+from relume_server.settings import Settings, parse_root_path
 
 LOOK: dict[str, object] = {}
 
