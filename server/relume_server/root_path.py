@@ -48,7 +48,7 @@ class RootPath:
             return
         if path.startswith(f"{decoded}/"):
             path = path.removeprefix(decoded)
-        await self._app(scope | {"path": path, "root_path": prefix}, receive, _with_prefix(prefix, send))
+        await self._app({**scope, "path": path, "root_path": prefix}, receive, _with_prefix(prefix, send))
 
     async def _forwarded(self, scope: Scope) -> str:
         """Prefix that a trusted proxy has removed; an invalid one counts as none."""
