@@ -34,7 +34,7 @@ _UNWANTED = re.compile(r"(^|/)(tests?|shared|data|node_modules|__pycache__|\.ven
 
 
 def wheel_faults(wheel: Path) -> list[str]:
-    """What is wrong with a wheel's contents, one sentence each: packages, editor, files that do not belong in it."""
+    """Faults of a wheel's contents, one sentence each: packages, editor, files that do not belong in it."""
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         page = archive.read(REQUIRED[0]).decode() if REQUIRED[0] in names else ""
@@ -47,7 +47,7 @@ def wheel_faults(wheel: Path) -> list[str]:
 
 
 def sdist_faults(sdist: Path) -> list[str]:
-    """What is wrong with a source distribution's contents, one sentence each."""
+    """Faults of a source distribution's contents, one sentence each."""
     with tarfile.open(sdist) as archive:
         names = [name.partition("/")[2] for name in archive.getnames()]
     required = (
@@ -72,7 +72,7 @@ def _common_faults(path: Path, names: Sequence[str]) -> list[str]:
 
 
 def release_faults(root: Path, version: str) -> list[str]:
-    """Why a checkout is not to be released as this version, one sentence each."""
+    """Reasons why a checkout is not to be released as this version, one sentence each."""
     named = tomllib.loads((root / "pyproject.toml").read_text())["project"]["version"]
     command = ["git", "status", "--porcelain"]
     status = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout  # noqa: S603
