@@ -33,7 +33,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # Bytecode is kept, whatever the shell says: tests start hundreds of processes, each of which would compile all sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-slow corpus bench soak lint audit lock clean client-check
+.PHONY: help setup demo test test-slow corpus bench soak wheel release lint audit lock clean client-check
 
 help:  ## what each target does
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
@@ -62,6 +62,12 @@ MINUTES ?= 120
 soak: setup  ## sessions, bakes, deletes and killed processes for MINUTES; memory, handles and disk stay flat
 	$(BIN)/python -m relume_bench.soak --minutes $(MINUTES)
 
+wheel: $(PROJECT_STAMP) $(CLIENT_BUILD)  ## the wheel, with the built editor, and the source distribution, in dist/
+	$(BIN)/python scripts/build_distributions.py
+
+release: $(PROJECT_STAMP) $(CLIENT_BUILD)  ## the same of a clean checkout whose VERSION the changelog names
+	$(BIN)/python scripts/build_distributions.py --release "$(or $(VERSION),$(error name it: make release VERSION=0.1.0))"
+
 lint: $(PROJECT_STAMP)  ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -80,14 +86,14 @@ lock: $(LOCK_TOOLS)/bin/uv  ## choose package versions again
 	@printf '$(BUILD_NEEDS)' | $(UV) --constraint requirements.lock $(OPTIONAL) pyproject.toml - -o docker/requirements.lock
 
 clean:  ## remove what make made; data and bakes stay
-	rm -rf $(VENV) client_web/node_modules client_web/dist build test-results
+	rm -rf $(VENV) client_web/node_modules client_web/dist build dist test-results
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # What `pip install -e .` builds with, so that nothing is fetched beside the lock.
 BUILD_NEEDS := hatchling>=1.27\neditables\n
 # Installed everywhere but by a bare `pip install`.
-OPTIONAL := --extra usd --extra materialx
+OPTIONAL := --extra usd --extra materialx --extra postgres
 # Names, versions and hashes only: where packages come from is each machine's own setting.
 UV := $(LOCK_TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--no-annotate --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"

@@ -67,7 +67,7 @@ describe("textures in the making", () => {
     await vi.advanceTimersByTimeAsync(1000);
     expect(finished).toHaveBeenCalledOnce();
     expect(btfJobs.value.map(({ id }) => id)).toEqual(["b"]);
-    expect(requests).toContain("DELETE /api/materials/btf/jobs/a?delete_files=true");
+    expect(requests).toContain("DELETE ./api/materials/btf/jobs/a?delete_files=true");
     await vi.advanceTimersByTimeAsync(1000);
     await followed;
     expect(btfJobs.value).toEqual([]);
@@ -94,9 +94,9 @@ describe("textures in the making", () => {
     await deleteJob("a");
     expect(btfJobs.value.map(({ id }) => id)).toEqual(["b"]);
     expect(requests).toEqual([
-      "DELETE /api/materials/btf/jobs/a",
-      "DELETE /api/materials/btf/jobs/b",
-      "DELETE /api/materials/btf/jobs/a?delete_files=true",
+      "DELETE ./api/materials/btf/jobs/a",
+      "DELETE ./api/materials/btf/jobs/b",
+      "DELETE ./api/materials/btf/jobs/a?delete_files=true",
     ]);
   });
 
@@ -123,7 +123,7 @@ describe("textures in the making", () => {
     btfJobs.value = [work("a", failed), work("b", { ...failed, geometry: "mesh" }), work("d", { name: "Felt" })];
     await importImages(new File([], "Felt.zip"));
     expect(btfJobs.value.map(({ id }) => id)).toEqual(["b", "d"]);
-    expect(requests).toEqual(["DELETE /api/materials/btf/jobs/a?delete_files=true"]);
+    expect(requests).toEqual(["DELETE ./api/materials/btf/jobs/a?delete_files=true"]);
   });
 
   it("say how far they are, and why they failed", () => {

@@ -122,11 +122,11 @@ describe("files for the library", () => {
   afterEach(() => vi.unstubAllGlobals());
 
   it.each([
-    ["felt.zip", "/api/materials/btf/jobs"],
-    ["carpet01_W400xH400.BTF", "/api/materials/btf/jobs"],
-    ["gold.binary", "/api/materials/measured"],
-    ["gold.mtlx", "/api/materials/imported"],
-    ["gold.zip", "/api/materials/imported", "…Gold.MTLX…"],
+    ["felt.zip", "./api/materials/btf/jobs"],
+    ["carpet01_W400xH400.BTF", "./api/materials/btf/jobs"],
+    ["gold.binary", "./api/materials/measured"],
+    ["gold.mtlx", "./api/materials/imported"],
+    ["gold.zip", "./api/materials/imported", "…Gold.MTLX…"],
   ])("%s goes where it is read", async (name, path, content = "!") => {
     const requests: string[] = [];
     class Request {

@@ -51,7 +51,7 @@ test("a second press before the server has answered begins no second export", as
   void renderAndSave("EXR", "frames/0", REQUEST, "");
   void renderAndSave("EXR", "frames/0", REQUEST, "");
   await vi.advanceTimersByTimeAsync(100);
-  expect(posted).toEqual(["/api/renders"]);
+  expect(posted).toEqual(["./api/renders"]);
 });
 
 test("an export goes on after a reload, and while the server is away; its file is saved once", async () => {
@@ -69,7 +69,7 @@ test("an export goes on after a reload, and while the server is away; its file i
   answer = state("ready");
   await vi.advanceTimersByTimeAsync(1000);
   expect(exporting.value).toBeNull();
-  expect(saved).toEqual(["/api/renders/a/video.mp4"]);
+  expect(saved).toEqual(["./api/renders/a/video.mp4"]);
   void (await page()).resumeRendering();
   await vi.advanceTimersByTimeAsync(1000);
   expect(saved).toHaveLength(1);

@@ -38,18 +38,18 @@ test("a look is saved only where there is none of its name, and that is undone",
   expect(names()).toEqual(["Old", "New"]);
   await exchangeSavedLook(saved, null);
   expect(names()).toEqual(["Old"]);
-  expect(requests).toEqual(["PUT /api/looks/New none *", 'DELETE /api/looks/New "2"']);
+  expect(requests).toEqual(["PUT ./api/looks/New none *", 'DELETE ./api/looks/New "2"']);
 });
 
 test("a look that is saved over must be the one that is known", async () => {
   await exchangeSavedLook(old, { name: "Old", look: { ...LOOK, lights: {} } });
-  expect(requests).toEqual(['PUT /api/looks/Old "1"']);
+  expect(requests).toEqual(['PUT ./api/looks/Old "1"']);
   expect(savedLooks.value[0]?.etag).toBe('"2"');
 });
 
 test("a look that is renamed is written before the old one goes", async () => {
   await exchangeSavedLook(old, { name: "New", look: LOOK });
-  expect(requests).toEqual(["PUT /api/looks/New?created=1 none *", 'DELETE /api/looks/Old "1"']);
+  expect(requests).toEqual(["PUT ./api/looks/New?created=1 none *", 'DELETE ./api/looks/Old "1"']);
   expect(names()).toEqual(["New"]);
 });
 
@@ -75,7 +75,7 @@ test("looks come in the order in which they were saved first, with their thumbna
   scene.value = { id: "s", materials: [], lights: [] } as never;
   vi.stubGlobal("fetch", (path: string) =>
     Promise.resolve(
-      path === "/api/looks" ? Response.json(entries) : new Response("{}", { headers: { etag: `"${path.at(-1)}"` } }),
+      path === "./api/looks" ? Response.json(entries) : new Response("{}", { headers: { etag: `"${path.at(-1)}"` } }),
     ),
   );
   await refreshSavedLooks();
@@ -93,10 +93,10 @@ test("the thumbnail of a look goes along when it is renamed, and is there when i
   cacheThumbnail('"1"', "/api/looks/Old/thumbnail.webp?version=1");
   await exchangeSavedLook(old, { name: "New", look: LOOK });
   const thumbnail = '{"picture":"data:image/webp;base64,AQID"}';
-  expect(sent).toEqual([`/api/looks/New/thumbnail ${thumbnail}`]);
+  expect(sent).toEqual([`./api/looks/New/thumbnail ${thumbnail}`]);
   await exchangeSavedLook({ name: "New", look: LOOK, created: "1" }, null);
   await exchangeSavedLook(null, { name: "New", look: LOOK, created: "1" });
-  expect(sent).toEqual([`/api/looks/New/thumbnail ${thumbnail}`, `/api/looks/New/thumbnail ${thumbnail}`]);
+  expect(sent).toEqual([`./api/looks/New/thumbnail ${thumbnail}`, `./api/looks/New/thumbnail ${thumbnail}`]);
 });
 
 test("a look is called otherwise than those of other scenes, which are not shown", async () => {

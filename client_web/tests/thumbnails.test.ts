@@ -59,7 +59,7 @@ test("a look gives its picture to what it is the look of, once, and to everybody
   savedLooks.value = [{ name: "Bright", etag: '"b"', created: "1", look: bright }];
   attachThumbnail(bright, "data:bright");
   attachThumbnail(bright, "data:another");
-  await vi.waitFor(() => expect(sent).toEqual(['PUT /api/looks/Bright/thumbnail "b" {"picture":"data:bright"}']));
+  await vi.waitFor(() => expect(sent).toEqual(['PUT ./api/looks/Bright/thumbnail "b" {"picture":"data:bright"}']));
   expect([thumbnailOf('"b"'), variantThumbnail("Bright"), variantThumbnail("Own")]).toEqual([
     "data:bright",
     "data:bright",

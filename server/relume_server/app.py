@@ -46,6 +46,7 @@ from relume_server.lifecycle.drain import DrainState
 from relume_server.lifecycle.server import ServerProcess
 from relume_server.lifecycle.websocket_protocol import Socket
 from relume_server.request_limits import RequestLimits
+from relume_server.root_path import RootPath
 from relume_server.runtime.assets import using_asset_stores
 from relume_server.runtime.library import open_library
 from relume_server.schemas.protocol import MAX_MESSAGE_BYTES
@@ -156,6 +157,7 @@ def create_app(
         https_only=settings.https_only,
         count=metrics.count_request,
     )
+    app.add_middleware(RootPath, root_path=settings.root_path, identity=lambda: app.state.services.access.identity)
     app.add_middleware(RequestIds)
     for group in ROUTE_GROUPS:
         takes_any = group in (session, health)  # a session's address is checked by the session

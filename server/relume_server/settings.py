@@ -34,6 +34,12 @@ def _machine_bytes() -> int:
     return machine_bytes()
 
 
+def _editor_folder() -> Path:
+    """The built editor: in a wheel beside this module, else of the checkout."""
+    installed = Path(__file__).with_name("editor")
+    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "client_web" / "dist"
+
+
 _HOST_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9_]([A-Za-z0-9_.-]{0,251}[A-Za-z0-9_])?")
 
 
@@ -51,6 +57,26 @@ ProxyAddress = Annotated[str, AfterValidator(_check_proxy)]
 """An IP address, a network such as 10.0.0.0/8, or a host name."""
 
 
+_SEGMENT = r"/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~@:+=,%-]+"
+_ROOT_PATH = re.compile(rf"(?!/(?:api|assets)/?$)(?:{_SEGMENT})+/?")
+_MAX_ROOT_PATH = 255
+
+
+def parse_root_path(text: str) -> str:
+    """Prefix without a slash at its end; empty for "" and "/".
+
+    `/api` and `/assets` alone are refused: with them, `/api/scenes` could be a path with or without prefix.
+
+    Raises:
+        ValueError: not a path of plain segments. `//host` would be another host in `Location`.
+    """
+    if text in ("", "/"):
+        return ""
+    if len(text) > _MAX_ROOT_PATH or _ROOT_PATH.fullmatch(text) is None:
+        raise ValueError("a path such as /relume, of letters, digits and ._~@:+=,%- (not /api or /assets)")
+    return text.removesuffix("/")
+
+
 Config = Annotated[str | None, AfterValidator(lambda text: None if text == "none" else text)]
 """An OpenColorIO config, or "none"."""
 
@@ -64,6 +90,9 @@ class Settings(BaseSettings):
     database: str = Field(default="", description="SQLAlchemy URL; empty: relume.db in the data directory")
     host: str = Field(default="127.0.0.1", description="address to listen on")
     port: int = Field(default=8420, ge=0, le=65535, description="port to listen on")
+    root_path: Annotated[str, AfterValidator(parse_root_path)] = Field(
+        default="", description="path at which a proxy publishes the server, such as /relume"
+    )
     scheduler: str | None = Field(default=None, description="Dask scheduler, tcp://…; unset: an embedded worker")
     ocio: Config = Field(
         default_factory=lambda: os.environ.get("OCIO") or None,
@@ -71,9 +100,7 @@ class Settings(BaseSettings):
         description="OpenColorIO config: .ocio or .ocioz file, ocio://… for a built-in config, or none; unset: OCIO",
     )
     ocio_space: str | None = Field(default=None, description="the config's name of linear Rec. 709, if detection fails")
-    client: Path = Field(
-        default=Path(__file__).resolve().parents[2] / "client_web" / "dist", description="directory of the built editor"
-    )
+    client: Path = Field(default_factory=_editor_folder, description="directory of the built editor")
     cache_bytes: int = Field(
         default_factory=_default_cache_bytes, gt=0, description="budget of the cache of results computed from bakes"
     )
@@ -116,7 +143,7 @@ class Settings(BaseSettings):
         default=False, description="whether clients use HTTPS only: Secure cookies, Strict-Transport-Security"
     )
     trusted_proxies: list[ProxyAddress] = Field(
-        default=[], description="addresses, networks or names of proxies trusted for X-Forwarded-For, as JSON list"
+        default=[], description="addresses, networks or names of proxies trusted for X-Forwarded-…, as JSON list"
     )
     user_header: str = Field(default="", description="header with the user's name from these proxies; empty: none")
     proxy_role: RoleName = Field(default="view", description="role of users named by a proxy")

@@ -48,13 +48,20 @@ def proxy_to_shared_name(folder: Path, addresses: Sequence[str], server_port: in
 @contextmanager
 def _running(folder: Path, port: int, servers: Sequence[str], command_prefix: Sequence[str] = ()) -> Iterator[None]:
     """nginx at a port until the context ends; `command_prefix` precedes its command."""
-    if _NGINX is None:
-        pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
     text = CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
     text = text.replace("listen 8420", f"listen 127.0.0.1:{port}")
     (line,) = re.findall(r"server server:8420[^;]*;", text)
     lines = "".join(line.replace("server:8420", each) for each in servers)
-    (folder / "nginx.conf").write_text(text.replace(line, lines))
+    with running_nginx(folder, port, text.replace(line, lines), command_prefix):
+        yield
+
+
+@contextmanager
+def running_nginx(folder: Path, port: int, text: str, command_prefix: Sequence[str] = ()) -> Iterator[None]:
+    """nginx with a configuration that listens at a port, until the context ends; skips the test without nginx."""
+    if _NGINX is None:
+        pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
+    (folder / "nginx.conf").write_text(text)
     # root in the namespace is the current user and cannot become another
     directives = "daemon off;" + (" user root;" if command_prefix else "")
     command = [*command_prefix, _NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", directives]

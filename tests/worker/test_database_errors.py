@@ -1,6 +1,7 @@
 """Database failures are readable messages, and retry loops log them once."""
 
 import logging
+import sys
 import time
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from fake_method import tiny_scene
 from sqlalchemy import event
 from sqlalchemy.exc import OperationalError
 
-from relume.core.errors import DatabaseDamagedError, DiskFullError
+from relume.core.errors import DatabaseDamagedError, DiskFullError, ParameterError
 from relume_worker.database import open_database
 from relume_worker.database.failures import DatabaseError, Outage
 from relume_worker.ledger import Ledger
@@ -23,6 +24,14 @@ def test_damaged_database_is_rejected_on_open(tmp_path: Path) -> None:
     with pytest.raises(DatabaseDamagedError, match=r"move relume.db, .* away"):
         open_database(f"sqlite:///{tmp_path / 'relume.db'}")
     assert (tmp_path / "relume.db").read_bytes() == GARBAGE
+
+
+def test_postgresql_without_its_driver_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "relume_worker.database.postgresql", raising=False)
+    monkeypatch.delattr("relume_worker.database.postgresql", raising=False)
+    monkeypatch.setitem(sys.modules, "pg8000", None)
+    with pytest.raises(ParameterError, match=r"pip install relume\[postgres\]"):
+        open_database("postgresql://ann@db.example.org/relume")
 
 
 def test_damage_while_open_is_reported(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import type { ExampleSceneBody, SceneBody } from "../protocol";
 import { viewsToBake, type BakeSettings } from "../session/scene/bakeSettings";
 import type { BakeMethod } from "../session/scene/bakeMethods";
 import { reportErrors } from "../ui/toasts";
+import { serverUrl } from "../session/net/serverUrl";
 
 interface ExampleScenesProps {
   /** Open the scene; `choice`: bake settings, unset if it was baked before. */
@@ -38,7 +39,7 @@ export function ExampleScenes({ onOpen }: ExampleScenesProps) {
               onClick={() => void createScene(builtIn)}
             >
               <img
-                src={`/built-in/${builtIn.name}.webp`}
+                src={serverUrl(`/built-in/${builtIn.name}.webp`)}
                 alt=""
                 onError={(event) => (event.currentTarget.style.visibility = "hidden")}
               />

@@ -7,6 +7,7 @@ import { IconButton } from "../ui/IconButton";
 import { formatCount } from "../ui/scale";
 import { BakeProgress } from "./BakeProgress";
 import { warningCounts, ImportWarnings } from "./ImportWarnings";
+import { serverUrl } from "../session/net/serverUrl";
 
 interface SceneCardProps {
   scene: SceneBody;
@@ -28,7 +29,7 @@ function CardImage({ url }: { url: string }) {
     <>
       <span class="no-picture">{placeholder}</span>
       <img
-        src={url}
+        src={serverUrl(url)}
         alt=""
         loading="lazy"
         onLoad={() => setPlaceholder("")}

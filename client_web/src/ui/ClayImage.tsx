@@ -1,5 +1,6 @@
 /** A clay picture from the server; the previous one stays until the next has loaded. */
 import { useState } from "preact/hooks";
+import { serverUrl } from "../session/net/serverUrl";
 
 interface ClayImageProps {
   url: string;
@@ -20,7 +21,7 @@ export function ClayImage({ url, label, isLazy = false, onSettled }: ClayImagePr
   return (
     <img
       class={`clay ${loaded.url === url ? "" : "is-loading"}`}
-      src={url}
+      src={serverUrl(url)}
       alt={label}
       loading={isLazy ? "lazy" : "eager"}
       onLoad={() => settle(false)}

@@ -1,11 +1,11 @@
-"""Serve the built editor: hashed assets are cached forever, the page never; unknown paths get the page."""
+"""Serve the built editor: hashed assets are cached forever, the page never; unknown paths lead to the page."""
 
 from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
 from starlette.exceptions import HTTPException
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocketClose
@@ -17,7 +17,7 @@ NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>relum
 
 
 class Client(StaticFiles):
-    """Files of the editor under /; a path without suffix that is no file is a route of the editor."""
+    """Files of the editor under /; a path without suffix that is no file leads to the page."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(directory=folder, check_dir=False)
@@ -48,7 +48,14 @@ class Client(StaticFiles):
         except HTTPException as error:
             if error.status_code != 404 or PurePosixPath(path).suffix:
                 raise
-            response = await super().get_response("index.html", scope)
+            return _redirect_to_page(scope)
         is_asset = path.startswith("assets/") and response.status_code in (200, 304)
         response.headers["Cache-Control"] = FOR_EVER if is_asset else "no-cache"
         return response
+
+
+def _redirect_to_page(scope: Scope) -> Response:
+    """Redirect to the page, which finds its files beside itself; relative: a proxy may have removed a prefix."""
+    query = scope["query_string"].decode("latin-1")
+    page = "../" * (scope["path"].count("/") - 1) or "./"
+    return RedirectResponse(f"{page}?{query}" if query else page)

@@ -44,9 +44,20 @@ async def login(credentials: LoginRequest, request: Request, services: ServicesD
     response = Response(status_code=204)
     secure = services.settings.https_only or access.identity.is_secure(request.scope)
     response.set_cookie(
-        COOKIE, credentials.token, max_age=COOKIE_SECONDS, path="/", secure=secure, httponly=True, samesite="strict"
+        COOKIE,
+        credentials.token,
+        max_age=COOKIE_SECONDS,
+        path=_cookie_path(request),
+        secure=secure,
+        httponly=True,
+        samesite="strict",
     )
     return response
+
+
+def _cookie_path(request: Request) -> str:
+    """Path prefix of the server, so that other servers of this host have cookies of their own."""
+    return request.scope["root_path"] or "/"
 
 
 def _line(caller: Caller, status: int) -> Change:
@@ -54,10 +65,10 @@ def _line(caller: Caller, status: int) -> Change:
 
 
 @router.post("/logout", status_code=204)
-async def logout() -> Response:
+async def logout(request: Request) -> Response:
     """Delete the cookie; the token stays valid."""
     response = Response(status_code=204)
-    response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
+    response.delete_cookie(COOKIE, path=_cookie_path(request), httponly=True, samesite="strict")
     return response
 
 

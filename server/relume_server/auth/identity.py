@@ -63,11 +63,16 @@ class Identity:
 
     def address(self, scope: Scope) -> str:
         """Address of the client: the peer, or for a trusted proxy the last one it has forwarded."""
-        return self._proxy_header(scope, "x-forwarded-for").split(",")[-1].strip()[:64] or _peer(scope)
+        return self._proxy_header(scope, "x-forwarded-for")[:64] or _peer(scope)
 
     def is_secure(self, scope: Scope) -> bool:
         """True if the browser uses TLS, to the server or to a trusted proxy."""
-        return "https" in (scope["scheme"], self._proxy_header(scope, "x-forwarded-proto").split(",")[-1].strip())
+        return "https" in (scope["scheme"], self._proxy_header(scope, "x-forwarded-proto"))
+
+    async def forwarded(self, scope: Scope, name: str) -> str:
+        """Header of a trusted proxy: the last of its values; empty for any other peer."""
+        await self._proxies.resolve(_peer(scope))
+        return self._proxy_header(scope, name)
 
     async def by_token(self, text: str, address: str, tokens: TokenStore) -> Caller | None:
         """Return the caller of a token; asks the database, unless the result is cached.
@@ -99,8 +104,10 @@ class Identity:
         return Caller(PROXY + name, ROLES[self._roles.get(name, self._role)], address, "proxy")
 
     def _proxy_header(self, scope: Scope, name: str) -> str:
-        """Header of a trusted proxy; empty for any other peer."""
-        return _last(Headers(scope=scope), name) if self._proxies.has(_peer(scope)) else ""
+        """Last value of a trusted proxy's header; empty for any other peer."""
+        if not self._proxies.has(_peer(scope)):
+            return ""
+        return _last(Headers(scope=scope), name).split(",")[-1].strip()
 
 
 def _peer(scope: Scope) -> str:

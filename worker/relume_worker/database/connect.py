@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 import time
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from sqlalchemy import URL, Engine, create_engine, event
@@ -13,9 +14,9 @@ from sqlalchemy.exc import ArgumentError
 
 from relume.core.errors import Description, ParameterError
 from relume_worker.database.failures import translate_error, watch
-from relume_worker.database.postgresql import TLS_MODES, connect_postgresql
 from relume_worker.database.upgrading import upgrade
 
+TLS_MODES = ("prefer", "require", "verify-full")  # libpq's names; the first is the default
 BUSY_TIMEOUT_MS = 30_000
 _RETRY_S = 0.01
 POOL_TIMEOUT_S = 10.0
@@ -42,6 +43,7 @@ def connect(url: str) -> Engine:
     """Return an engine for `url` with its tables unchanged. Raises ParameterError."""
     database_url = _parse(url)
     if database_url.get_backend_name() == "postgresql":
+        connect_postgresql = _import_driver().connect_postgresql
         waits = {"pool_timeout": POOL_TIMEOUT_S, "max_overflow": MAX_OVERFLOW}
         engine = create_engine(database_url, pool_pre_ping=True, **waits)
         watch(engine)
@@ -55,6 +57,17 @@ def connect(url: str) -> Engine:
         event.listen(engine, "connect", _set_up_sqlite)
     event.listen(engine, "handle_error", translate_error)
     return engine
+
+
+def _import_driver() -> ModuleType:
+    """Module of PostgreSQL's connections, which needs an optional package."""
+    try:
+        from relume_worker.database import postgresql
+    except ImportError:
+        value = Description("a URL of PostgreSQL, whose driver is not installed")
+        allowed = "one of SQLite, or install the driver: pip install relume[postgres]"
+        raise ParameterError("RELUME_DATABASE", value, allowed) from None
+    return postgresql
 
 
 def _parse(url: str) -> URL:

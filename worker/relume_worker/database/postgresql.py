@@ -12,7 +12,6 @@ import pg8000
 
 TIMEOUT_S = 10.0  # for connecting, and for each answer: covers dead hosts and hanging servers
 PORT = 5432
-TLS_MODES = ("prefer", "require", "verify-full")  # libpq's names; the first is the default
 
 
 class _Connection(pg8000.Connection):  # type: ignore[misc]  # it has no types

@@ -22,6 +22,7 @@ import {
   deleteCommentWithUndo,
   setCommentResolved,
 } from "./commentActions";
+import { serverUrl } from "../../session/net/serverUrl";
 
 const DATE_FORMAT = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
 
@@ -98,7 +99,7 @@ function CommentEntry({ comment }: { comment: CommentBody }) {
         aria-label={`Show comment ${number} in the picture`}
         onClick={() => showComment(comment)}
       >
-        {snapshot === null ? <span>{view}</span> : <img src={snapshot} alt="" loading="lazy" />}
+        {snapshot === null ? <span>{view}</span> : <img src={serverUrl(snapshot)} alt="" loading="lazy" />}
         {snapshot !== null && <i class="comment-place" style={pinPosition(comment)} aria-hidden="true" />}
       </button>
       <p class="comment-head">

@@ -6,6 +6,7 @@ import { bake } from "../../state/bakes";
 import { scene } from "../../state/scene";
 import { joinState, members, selfNumber } from "../../state/collaboration";
 import { reportErrors } from "../../ui/toasts";
+import { serverUrl } from "../../session/net/serverUrl";
 
 /** An unguessable room name. */
 function generateRoomKey(): string {
@@ -36,7 +37,7 @@ export async function createRoomLink(kind: "edit" | "watch"): Promise<string | n
   if (key == null) return null;
   return (
     (await reportErrors(async () => {
-      const url = new URL((await createShareLink()).url, location.href);
+      const url = new URL(serverUrl((await createShareLink()).url), location.href);
       url.hash = keyFragment(kind === "edit" ? "room" : "watch", key);
       return url.href;
     })) ?? null

@@ -23,6 +23,7 @@ import {
   comparisonProgressText,
   errorSentences,
 } from "./comparisonMessages";
+import { serverUrl } from "../../session/net/serverUrl";
 
 type ComparisonView = "error" | "reference";
 
@@ -87,7 +88,10 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
           onSelect={(value) => setPaths(value)}
         />
       )}
-      <img src={comparisonImageUrl(body.id, file, body.completed)} alt={view === "error" ? "Error map" : "Reference"} />
+      <img
+        src={serverUrl(comparisonImageUrl(body.id, file, body.completed))}
+        alt={view === "error" ? "Error map" : "Reference"}
+      />
       <RadioRow
         label="Displayed picture"
         choices={COMPARISON_VIEWS}
@@ -108,7 +112,7 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
 function FirstPass({ body }: { body: ComparisonBody }) {
   return (
     <>
-      <img src={comparisonImageUrl(body.id, "reference", body.completed)} alt="Reference" />
+      <img src={serverUrl(comparisonImageUrl(body.id, "reference", body.completed))} alt="Reference" />
       <p class="comparison-scale">
         {body.completed === 0 ? "Low-resolution preview of the reference." : "Reference after one pass."} Results follow
         after the second pass.

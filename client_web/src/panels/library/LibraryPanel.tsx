@@ -24,6 +24,7 @@ import {
   showGroup,
   visibleEntries,
 } from "./libraryItems";
+import { serverUrl } from "../../session/net/serverUrl";
 
 const UNFITTED: Record<string, string> = { [IMPORTED]: "Imported", [MEASURED]: "Measurements", [BTFS]: "BTF textures" };
 
@@ -134,7 +135,7 @@ export function LibraryPanel() {
               onClick={() => applyToSelected(material.id)}
               onDragStart={(event) => event.dataTransfer?.setData(DRAG_TYPE, material.id)}
             >
-              <img src={material.thumbnail} alt="" width={64} height={64} loading="lazy" />
+              <img src={serverUrl(material.thumbnail)} alt="" width={64} height={64} loading="lazy" />
               <span>{material.name}</span>
             </button>
           </li>

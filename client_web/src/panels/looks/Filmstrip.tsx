@@ -19,6 +19,7 @@ import { completeLook, justSaved, storeLookAsA, saveLook, sideA } from "./abComp
 import { thumbnailOf, variantThumbnail } from "./namedThumbnails";
 import { deleteLook, refreshSavedLooks, renameLook, savedLooks, updateLook, type SavedLook } from "./savedLooks";
 import { goToStep } from "./undoRedo";
+import { serverUrl } from "../../session/net/serverUrl";
 
 const MAX_STEPS = 40;
 const MAX_NAME = 80;
@@ -39,7 +40,11 @@ function LookName({ saved }: { saved: SavedLook }) {
 }
 
 function TileImage({ image, text }: { image: string | null; text: string }) {
-  return image === null ? <span class="blank">{text.slice(0, 2)}</span> : <img src={image} alt="" draggable={false} />;
+  return image === null ? (
+    <span class="blank">{text.slice(0, 2)}</span>
+  ) : (
+    <img src={serverUrl(image)} alt="" draggable={false} />
+  );
 }
 
 /** Apply a saved look; for a read-only user, a new session starts with it. */

@@ -5,6 +5,7 @@ import type { RenderBody, RenderRequest } from "../../protocol";
 import { saveInTab, loadFromTab } from "../../state/tabSession";
 import { formatSeconds } from "../../ui/scale";
 import { reportErrors, showNote } from "../../ui/toasts";
+import { serverUrl } from "../../session/net/serverUrl";
 
 const POLL_MS = 300;
 const KEY = "relume.rendering";
@@ -71,7 +72,7 @@ async function pollRendering(rendering: ExportJob): Promise<void> {
   if (state === null) return; // another job may have started since
   if (state.state === "failed") throw new Error(`${exportName} export failed: ${problemText(state.problem)}`);
   clearExport();
-  download(`/api/renders/${encodeURIComponent(id)}/${fetchFrom}`, "");
+  download(serverUrl(`/api/renders/${encodeURIComponent(id)}/${fetchFrom}`), "");
 }
 
 /** Run `work` unless another export is running; report errors. */

@@ -14,6 +14,7 @@ import { look } from "../../state/look";
 import { mayEdit, joinTarget } from "../../state/sessionUser";
 import { shownViews, activeViewName, views } from "../../state/views";
 import { reportErrors, showNote } from "../../ui/toasts";
+import { serverUrl } from "../../session/net/serverUrl";
 
 /** A link that the browser did not let us copy, shown for copying by hand. */
 export const linkToCopy = signal<string | null>(null);
@@ -39,7 +40,7 @@ export async function createShareLink(): Promise<ShareEntry> {
 /** Store the visible state and copy its link. */
 export async function copyShareLink(): Promise<void> {
   await reportErrors(async () => {
-    const link = new URL((await createShareLink()).url, location.href).href;
+    const link = new URL(serverUrl((await createShareLink()).url), location.href).href;
     try {
       await navigator.clipboard.writeText(link);
       showNote("Link copied. It always shows this version.");

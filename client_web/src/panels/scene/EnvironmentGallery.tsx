@@ -12,6 +12,7 @@ import {
   loadEnvironments,
   importEnvironmentFile,
 } from "./environments";
+import { serverUrl } from "../../session/net/serverUrl";
 
 interface EnvironmentEntry {
   map: string | null;
@@ -50,7 +51,7 @@ function EnvironmentTile({
       title={entry.title}
       onClick={() => chooseEnvironment(entry.map)}
     >
-      <img src={entry.thumbnail} alt="" width={64} height={32} />
+      <img src={serverUrl(entry.thumbnail)} alt="" width={64} height={32} />
       <span>{entry.name}</span>
     </button>
   );

@@ -16,6 +16,7 @@ import { watchBalls, displayedBalls } from "./materialBalls";
 import { BackgroundPanel } from "./BackgroundPanel";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
+import { serverUrl } from "../../session/net/serverUrl";
 
 /** A preview ball of the material; until it is rendered, a gradient of its diffuse and highlight colors. Measured materials
  * show their thumbnail. */
@@ -25,7 +26,9 @@ function MaterialSwatch({ name, material }: { name: string; material: MaterialLo
   if (ball !== undefined) return <span class="swatch" style={{ background: `url(${ball}) center / 130%` }} />;
   const measured = terms.find((term) => term.data != null)?.data;
   if (measured != null)
-    return <span class="swatch" style={{ background: `url(${measuredThumbnailUrl(measured)}) center / 130%` }} />;
+    return (
+      <span class="swatch" style={{ background: `url(${serverUrl(measuredThumbnailUrl(measured))}) center / 130%` }} />
+    );
   const diffuse = terms.find((term) => modelOf(term)?.texture === "diffuse");
   const glossy = terms.find((term) => modelOf(term)?.texture !== "diffuse");
   const body = diffuse === undefined ? "#1c1c1c" : toHex(diffuse.color);

@@ -36,6 +36,7 @@ import type {
   ComparisonPlanBody,
   ComparisonRequest,
 } from "../../protocol";
+import { serverUrl } from "./serverUrl";
 
 export class ApiError extends Error {
   constructor(
@@ -80,7 +81,7 @@ export function onUnauthorized(callback: typeof unauthorizedListener): void {
 export async function request(path: string, init: RequestInit = {}): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(path, init);
+    response = await fetch(serverUrl(path), init);
   } catch {
     throw new UnreachableError();
   }

@@ -1,6 +1,7 @@
 /** A bake's progress as server-sent events; falls back to polling if the stream breaks. */
 import type { BakeBody } from "../../protocol";
 import { getBake } from "./api";
+import { serverUrl } from "./serverUrl";
 
 const POLL_MS = 1500;
 
@@ -12,7 +13,7 @@ function isFinished(bake: BakeBody): boolean {
 export function subscribeToBake(id: string, onUpdate: (bake: BakeBody) => void): () => void {
   let stopped = false;
   let timer = 0;
-  const source = new EventSource(`/api/bakes/${encodeURIComponent(id)}/events`);
+  const source = new EventSource(serverUrl(`/api/bakes/${encodeURIComponent(id)}/events`));
   const stop = () => {
     stopped = true;
     source.close();

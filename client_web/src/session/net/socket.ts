@@ -2,6 +2,7 @@
 import { ROOM_PREFIX, SUBPROTOCOL, type ClientMessage, type OpenMessage } from "../../protocol";
 import { backoffMs } from "./backoff";
 import { Heartbeat } from "./heartbeat";
+import { serverUrl } from "./serverUrl";
 
 /** Login missing or no longer valid. */
 export const LOGIN_CODE = 4401;
@@ -52,7 +53,7 @@ export class SessionSocket {
 
   connect(): void {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
-    const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
+    const url = new URL(serverUrl(`/api/bakes/${encodeURIComponent(this.bake)}/session`), location.href);
     url.protocol = url.protocol.replace("http", "ws");
     // everything else is in a message: URLs are logged
     const opening: OpenMessage = { type: "open", ...this.openParameters(), resume: this.resume };

@@ -10,6 +10,7 @@ import type {
   SceneBody,
 } from "../../protocol";
 import { ApiError } from "./api";
+import { serverUrl } from "./serverUrl";
 
 export interface SceneUpload {
   scene: DroppedFile;
@@ -38,7 +39,7 @@ function postForm(path: string, form: FormData, progress: (fraction: number) => 
     request.upload.onprogress = (event) => progress(event.total > 0 ? event.loaded / event.total : 0);
     request.onload = () => resolve(request);
     request.onerror = () => reject(new ApiError("Upload interrupted. Nothing was imported; try again.", 0));
-    request.open("POST", path);
+    request.open("POST", serverUrl(path));
     request.send(form);
   }).then(parseResponse);
 }

@@ -4,6 +4,7 @@ import { IconButton } from "../../../ui/IconButton";
 import { ImageFileField } from "./ImageFileField";
 import { ImageOptions } from "./ImageOptions";
 import { imageOf, offerToDeleteImage, uploadAndAssign, type AssignImage } from "./imageStore";
+import { serverUrl } from "../../../session/net/serverUrl";
 
 export interface ImageChoiceProps {
   label: string;
@@ -42,7 +43,7 @@ export function ImageChoice({
   };
   return (
     <div class="base-image-row">
-      {image !== undefined && <img src={image.thumbnail} alt="" width={24} height={24} />}
+      {image !== undefined && <img src={serverUrl(image.thumbnail)} alt="" width={24} height={24} />}
       <select
         aria-label={label}
         title={title}
