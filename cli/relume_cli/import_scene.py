@@ -10,6 +10,7 @@ import typer
 
 from relume.core.import_warnings import by_severity
 from relume.scene_io.import_options import LightUnit, Recenter, Unit, UpAxis
+from relume_cli.companion_files import Root, open_companions
 from relume_cli.options import Data, check_readable
 from relume_cli.terminal.printing import Json, note, print_result
 
@@ -50,14 +51,19 @@ def import_scene(
     scene_name: Annotated[
         str | None, typer.Option(help="Name or number of the scene, of a glTF file with several.")
     ] = None,
+    time: Annotated[
+        float | None,
+        typer.Option(help="Time of the animation: seconds, in USD its time code. [default: rest pose, or first time]"),
+    ] = None,
+    root: Root = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Import a scene; print its id.
 
     Prints a warning for each feature that was not read: "unsupported" is missing or differs from the file,
-    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter, --light-unit
-    and --scene-name are remembered: the next import of a scene with this name has them unless others are given.
+    "approximated" looks much the same, "ignored" does not change the image. --up, --unit, --recenter, --light-unit,
+    --scene-name and --time are remembered: the next import of a scene with this name has them unless others are given.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings
@@ -65,6 +71,7 @@ def import_scene(
     from relume_worker.scenes import get_scene, register_scene
 
     options_given = {"up": up, "unit": unit, "recenter": recenter, "light_unit": light_unit, "scene_name": scene_name}
+    options_given["time"] = None if time is None else str(time)
     given = {key: value for key, value in options_given.items() if value is not None}
     if built_in is not None and given:
         from relume.core.errors import ParameterError
@@ -73,7 +80,7 @@ def import_scene(
     service = open_bakes(open_settings(data))
     try:
         options = None if built_in or file is None else _options(service.ledger, name or file.stem, given)
-        scene = _read_scene(file, environment, name, built_in, options)
+        scene = _read_scene(file, environment, name, built_in, options, root)
         scene = with_ground(scene) if ground else scene
         record = get_scene(service.ledger, register_scene(service.data_dir, service.ledger, scene))
         bakes = service.bakes(record.id)
@@ -172,6 +179,7 @@ def _read_scene(
     name: str | None,
     built_in_name: str | None,
     options: ImportOptions | None,
+    root: Path | None,
 ) -> Scene:
     from relume.assets.environments.read_environment import read_environment
     from relume.core.errors import ParameterError, PlanError
@@ -188,4 +196,5 @@ def _read_scene(
     if environment is not None:
         check_readable("--environment", environment)
     light = None if environment is None else read_environment(environment, environment.stem)
-    return read_scene(check_readable("FILE", file), name or file.stem, light, options=options)
+    with open_companions(check_readable("FILE", file), root) as companions:
+        return read_scene(file, name or file.stem, light, companions, options)

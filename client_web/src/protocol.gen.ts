@@ -612,13 +612,14 @@ export interface ImageBody {
   thumbnail: string;
 }
 
-/** Properties of a scene that its file does not say. Attributes: up: the file's axis that points up. "file": as the file says, +Y if it does not. unit: the file's unit. "file": as the file says, meters if it does not. "auto": a guess from the size. recenter: whether positions are relative to the middle of the scene. "auto": if it is more than a hundred times its size from the origin, where single precision would round the shape. light_unit: unit of the file's punctual lights. "file": as the format says, candela and lux in glTF. "W/sr": radiometric, W/sr and W/m², as Blender exports "Unitless". "W": power of point and spot lights, as "Raw". scene_name: name or number of the scene to read, of a glTF file with several; empty for the file's default. */
+/** Properties of a scene that its file does not say. Attributes: up: the file's axis that points up. "file": as the file says, +Y if it does not. unit: the file's unit. "file": as the file says, meters if it does not. "auto": a guess from the size. recenter: whether positions are relative to the middle of the scene. "auto": if it is more than a hundred times its size from the origin, where single precision would round the shape. light_unit: unit of the file's punctual lights. "file": as the format says, candela and lux in glTF. "W/sr": radiometric, W/sr and W/m², as Blender exports "Unitless". "W": power of point and spot lights, as "Raw". scene_name: name or number of the scene to read, of a glTF file with several; empty for the file's default. time: moment of the animation, seconds in glTF, time code in USD. None: the rest pose of glTF, the first time of USD. */
 export interface ImportOptions {
   up: "file" | "y" | "z" | "-z";
   unit: "file" | "m" | "cm" | "mm" | "in" | "ft" | "auto";
   recenter: "auto" | "always" | "never";
   light_unit: "file" | "W/sr" | "W";
   scene_name: string;
+  time: number | null;
 }
 
 /** A file with materials. `warnings`: most severe first. */

@@ -15,6 +15,7 @@ describe("import options", () => {
       recenter: "auto",
       light_unit: "file",
       scene_name: "",
+      time: null,
     });
     for (const { choices } of IMPORT_OPTIONS)
       expect(new Set(choices.map(({ value }) => value)).size).toBe(choices.length);
@@ -23,6 +24,7 @@ describe("import options", () => {
   it("are text if they are not the defaults", () => {
     expect(optionsText(DEFAULT_OPTIONS)).toBe("");
     expect(optionsText({ ...DEFAULT_OPTIONS, up: "z", unit: "mm" })).toBe("Up axis +Z, Unit Millimeters");
+    expect(optionsText({ ...DEFAULT_OPTIONS, time: 0 })).toBe("Time 0");
     expect(areSameOptions(DEFAULT_OPTIONS, { ...DEFAULT_OPTIONS })).toBe(true);
     expect(areSameOptions(DEFAULT_OPTIONS, { ...DEFAULT_OPTIONS, recenter: "never" })).toBe(false);
   });

@@ -1,7 +1,6 @@
 """Decoder for images from untrusted sources: the header's size is checked before decoding.
 
-PNG, JPEG and WebP are decoded by Pillow; BMP, DDS, GIF, TIFF and Targa by OpenImageIO. Orientations in metadata are
-applied.
+PNG, JPEG and WebP are decoded by Pillow; BMP, DDS, GIF, TIFF and Targa by OpenImageIO.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ MAX_SIDE = 8_192
 MAX_TEXELS = 1_000_000_000  # of all images of a scene together, counted per decoding
 MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
 FORMATS = ("PNG", "JPEG", "WEBP")
+KTX2 = b"\xabKTX 20\xbb"
 OTHER_FORMATS = {b"BM": ".bmp", b"DDS ": ".dds", b"GIF8": ".gif", b"II*\0": ".tif", b"MM\0*": ".tif"}
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601, as Pillow has it
 _EXIF_ORIENTATION = 274
@@ -38,8 +38,12 @@ TARGA_KINDS = (1, 2, 3, 9, 10, 11)  # with a palette, in color or gray; plain or
 class Decoder:
     """Decoder of images that share one texel budget."""
 
-    def __init__(self) -> None:
-        self._remaining_texels = MAX_TEXELS
+    def __init__(self, *, applies_orientation: bool = True) -> None:
+        """
+        Args:
+            applies_orientation: whether images are turned as their metadata say.
+        """
+        self._remaining_texels, self._applies_orientation = MAX_TEXELS, applies_orientation
 
     def decode(self, data: bytes, label: str) -> Shaped[U8, "height width 4"]:
         """Decode an image to RGBA.
@@ -61,12 +65,14 @@ class Decoder:
     def _decode(
         self, data: bytes, label: str, convert: Callable[[PIL.Image.Image], NDArray[Scalar]]
     ) -> NDArray[Scalar]:
+        if data.startswith(KTX2):
+            raise SceneError(f"{label} is a KTX2 image; save it as PNG (ktx extract in.ktx2 out.png)")
         if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_JPEG_SCANS:
             raise SceneError(f"{label} is a JPEG of more than {MAX_JPEG_SCANS} scans; save it again")
         try:
             with _no_metadata_warnings(), PIL.Image.open(io.BytesIO(data), formats=FORMATS) as image:
                 self._check_size(*image.size, label)
-                return orient(convert(image), _exif_orientation(image))
+                return self._orient(convert(image), _exif_orientation(image))
         except SceneError:
             raise
         except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
@@ -93,7 +99,10 @@ class Decoder:
                 clear_error(image.geterror)
                 raise SceneError(f"{label} ends early or is damaged; save it as PNG")
             values = np.asarray(pixels).reshape(spec.height, spec.width, num_channels)
-            return orient(values, spec.get_int_attribute("Orientation", 1))
+            return self._orient(values, spec.get_int_attribute("Orientation", 1))
+
+    def _orient(self, values: NDArray[Scalar], orientation: int) -> NDArray[Scalar]:
+        return orient(values, orientation) if self._applies_orientation else values
 
     def _check_size(self, width: int, height: int, label: str) -> None:
         if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):

@@ -23,6 +23,8 @@ class ImportOptions(BaseModel):
         light_unit: unit of the file's punctual lights. "file": as the format says, candela and lux in glTF. "W/sr":
             radiometric, W/sr and W/m², as Blender exports "Unitless". "W": power of point and spot lights, as "Raw".
         scene_name: name or number of the scene to read, of a glTF file with several; empty for the file's default.
+        time: moment of the animation, seconds in glTF, time code in USD. None: the rest pose of glTF, the first time
+            of USD.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -32,7 +34,8 @@ class ImportOptions(BaseModel):
     recenter: Recenter = "auto"
     light_unit: LightUnit = "file"
     scene_name: Annotated[str, Field(max_length=200)] = ""
+    time: Annotated[float, Field(allow_inf_nan=False)] | None = None
 
     def document(self) -> dict[str, str]:
-        """The options as JSON, without those that have their default."""
-        return self.model_dump(exclude_defaults=True)
+        """The options as text, without those that have their default."""
+        return {key: str(value) for key, value in self.model_dump(exclude_defaults=True).items()}

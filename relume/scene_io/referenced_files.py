@@ -55,19 +55,32 @@ class NoFiles:
 
 
 class Folder:
-    """The folder of a scene file, with its subfolders."""
+    """The folder of a scene file, with its subfolders; with a root, those of a folder above it, too."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder.resolve()
+    def __init__(self, folder: Path, root: Path | None = None) -> None:
+        """
+        Args:
+            folder: of the scene file; names are relative to it. root: files below it may be read; None for `folder`.
+
+        Raises:
+            SceneError: the folder is not below the root.
+        """
+        inner = folder.resolve()
+        self._root = inner if root is None else root.resolve()
+        if not inner.is_relative_to(self._root):
+            raise SceneError(f"{inner} is not below the root {self._root}; give a folder above the scene file")
+        self._folder = inner.relative_to(self._root).as_posix()
+        self._outside = set[Path]()
         self._remaining_bytes = MAX_BYTES
 
     def read(self, name: str, label: str) -> bytes | None:
-        """Read a file as `Companions.read` does; links are only followed within the folder."""
+        """Read a file as `Companions.read` does; links are only followed below the root."""
         for spelling in dict.fromkeys((unquote(name), name)):
-            plain = relative_path(spelling, label)
+            plain = self._inside(spelling, label)
             try:
-                path = _any_case(self._folder, plain).resolve()
-                if not path.is_relative_to(self._folder):
+                path = _any_case(self._root, plain).resolve()
+                if not path.is_relative_to(self._root):
+                    self._outside.add(path)
                     raise SceneError(f"{label} is a link that leaves the scene's folder; copy the file there")
                 if not path.is_file():
                     continue
@@ -80,6 +93,29 @@ class Folder:
                     raise
                 raise SceneError(f"{label} cannot be read; check the file next to the scene") from None
         return None
+
+    def _inside(self, name: str, label: str) -> str:
+        """A name relative to the root; one that leaves it is stored. Raises SceneError as `relative_path` does."""
+        plain = posixpath.normpath(posixpath.join(self._folder, name.replace("\\", "/")))
+        try:
+            return relative_path(plain, label)
+        except SceneError:
+            if plain.startswith("../"):
+                self._outside.add(Path(posixpath.normpath(self._root / plain)))
+            raise
+
+    def sufficient_root(self) -> Path | None:
+        """The innermost folder with all existing files that were asked for and lie outside; None if there are none."""
+        outside = [str(path.parent) for path in self._outside if _is_file(path)]
+        return Path(posixpath.commonpath([str(self._root), *outside])) if outside else None
+
+
+def _is_file(path: Path) -> bool:
+    """True if a file exists, whatever its name holds."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _any_case(folder: Path, name: str) -> Path:

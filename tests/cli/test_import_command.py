@@ -7,8 +7,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import PIL.Image
 import pytest
+from glb_builder import Glb
 
 from relume_cli.main import main
 
@@ -61,3 +63,22 @@ def test_the_next_import_remembers_the_options(file: Path, capsys: pytest.Captur
     assert second["bounds"][1] == pytest.approx([0.2, 0.05, 0])
     third = imported(capsys, str(file), "--up", "file", "--unit", "file")
     assert third["bounds"][1] == [200, 0, 50]
+
+
+def test_the_time_of_an_animation_is_remembered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RELUME_DATA", str(tmp_path / "data"))
+    glb = Glb().quad()
+    sampler = {
+        "input": glb.accessor(np.array([0, 2], np.float32)),
+        "output": glb.accessor(np.array([[0, 0, 0], [0, 0, 4]], np.float32)),
+    }
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    glb.document["animations"] = [{"channels": [channel], "samplers": [sampler]}]
+    (tmp_path / "moving.glb").write_bytes(glb.bytes())
+    first = imported(capsys, str(tmp_path / "moving.glb"), "--time", "0.5")
+    assert first["bounds"][0] == [0, 0, 1]
+    assert first["import_options"] == {"time": "0.5"}
+    assert imported(capsys, str(tmp_path / "moving.glb"))["bounds"][0] == [0, 0, 1]
+    assert imported(capsys, str(tmp_path / "moving.glb"), "--time", "2")["bounds"][0] == [0, 0, 4]

@@ -170,6 +170,7 @@ BOUNDED = {
     "scene/examples/still_life/__init__.py",
     "scene/examples/tableau.py",
     "scene_io/surfaces/sheen.py",
+    "scene_io/usd/value_types.py",
     "store/run_bake.py",
     "transport/outgoing_patch_light.py",
 }

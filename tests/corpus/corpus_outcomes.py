@@ -13,7 +13,7 @@ import signal
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -66,15 +66,15 @@ def _named_by(path: Path) -> Iterator[str]:
         yield from (name, name.split()[-1]) if path.suffix.lower() == ".mtl" else (name,)
 
 
-def _set_of(path: Path) -> tuple[str, ...]:
+def _set_of(path: PurePath) -> tuple[str, ...]:
     return path.parts[:2]
 
 
-def outcome_of(path: Path) -> Outcome:
-    """Open a file; an error that is not for users is the outcome "crashed"."""
-    suffix = path.suffix.lower()
+def outcome_of(root: Path, name: str) -> Outcome:
+    """Open a file of a corpus, which may name files of its set; "crashed" if an error is not for users."""
+    path, folder = root / name, root.joinpath(*_set_of(PurePosixPath(name)))
     try:
-        warnings = [*_READERS[suffix](path)]
+        warnings = [*_READERS[path.suffix.lower()](path, Folder(path.parent, folder if folder.is_dir() else None))]
     except RelumeError as error:
         return {"outcome": "refused", "reason": _shortened(str(error))}
     except Exception as error:
@@ -90,33 +90,33 @@ def _shortened(text: str) -> str:
     return text if len(text) <= MAX_TEXT else text[: MAX_TEXT - 1] + "…"
 
 
-def _open_scene(path: Path) -> Iterable[ImporterWarning]:
-    return import_scene(path, path.stem, _LIGHT).warnings
+def _open_scene(path: Path, companions: Folder) -> Iterable[ImporterWarning]:
+    return import_scene(path, path.stem, _LIGHT, companions).warnings
 
 
-def _open_radiance(path: Path) -> Iterable[str]:
+def _open_radiance(path: Path, companions: Folder) -> Iterable[str]:
     """An environment; an .exr that is none is an image, as the editor takes it for one by its name."""
     try:
         return read_environment(path, path.stem).warnings
     except RelumeError:
         if path.suffix.lower() == ".hdr":
             raise
-        return _open_image(path)
+        return _open_image(path, companions)
 
 
-def _open_image(path: Path) -> Iterable[ImporterWarning]:
+def _open_image(path: Path, _: Folder) -> Iterable[ImporterWarning]:
     return read_image(path, path.stem)[1]
 
 
-def _open_measured(path: Path) -> Iterable[str]:
+def _open_measured(path: Path, _: Folder) -> Iterable[str]:
     return read_measured(path)[0].warnings
 
 
-def _open_materialx(path: Path) -> Iterable[ImporterWarning]:
-    return import_materialx(path.read_bytes(), Folder(path.parent)).warnings
+def _open_materialx(path: Path, companions: Folder) -> Iterable[ImporterWarning]:
+    return import_materialx(path.read_bytes(), companions).warnings
 
 
-_READERS: dict[str, Callable[[Path], Iterable[str]]] = {
+_READERS: dict[str, Callable[[Path, Folder], Iterable[str]]] = {
     suffix: reader
     for suffixes, reader in (
         (SCENES, _open_scene),

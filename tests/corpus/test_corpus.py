@@ -21,7 +21,7 @@ def decoders_warnings() -> None:
 
 
 def check(root: Path, table: Path, names: list[str]) -> None:
-    changed = differences(read_table(table), {name: outcome_of(root / name) for name in names})
+    changed = differences(read_table(table), {name: outcome_of(root, name) for name in names})
     if changed:
         listed = "\n".join(changed[:40])
         pytest.fail(f"{len(changed)} outcomes differ; if they are right, run make corpus:\n{listed}", pytrace=False)
@@ -89,7 +89,7 @@ def test_outcomes_of_three_files(tmp_path: Path) -> None:
     (tmp_path / "plain.obj").write_text(triangle)
     (tmp_path / "line.obj").write_text(f"{triangle}l 1 2\n")
     (tmp_path / "empty.obj").write_text("")
-    outcomes = {name: outcome_of(tmp_path / name) for name in list_files(tmp_path)}
+    outcomes = {name: outcome_of(tmp_path, name) for name in list_files(tmp_path)}
     assert outcomes["empty.obj"] == {
         "outcome": "refused",
         "reason": "the scene file is empty: 0 bytes; export or download it again",
@@ -102,10 +102,20 @@ def test_outcomes_of_three_files(tmp_path: Path) -> None:
     assert read_table(tmp_path / "outcomes.json") == outcomes
     assert differences(outcomes, outcomes) == []
     shutil.copy(tmp_path / "line.obj", tmp_path / "plain.obj")
-    (changed,) = differences(outcomes, {"plain.obj": outcome_of(tmp_path / "plain.obj")})
+    (changed,) = differences(outcomes, {"plain.obj": outcome_of(tmp_path, "plain.obj")})
     assert changed.startswith("plain.obj\n  was {'outcome': 'shown'}\n  is  {'outcome': 'shown with warnings'")
     assert summary(outcomes).splitlines() == [
         "3 files: 1 refused, 1 shown, 1 shown with warnings",
         "refused although trimesh reads them: 0",
         "     1  the scene file is empty: N bytes; export or download it again",
     ]
+
+
+def test_a_file_may_name_files_of_its_set_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "kind" / "set" / "meshes"
+    folder.mkdir(parents=True)
+    (folder / "a.obj").write_text("mtllib ../../../m.mtl\nusemtl A\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for place, outcome in ((tmp_path, "shown with warnings"), (folder.parent, "shown")):
+        (place / "m.mtl").write_text("newmtl A\nKd 1 0 0\n")
+        assert outcome_of(tmp_path, "kind/set/meshes/a.obj")["outcome"] == outcome
+        (folder / "a.obj").write_text((folder / "a.obj").read_text().replace("../../../", "../"))

@@ -22,7 +22,7 @@ def main() -> None:
         sys.exit(f"there is no folder {root}; give the folder of a corpus")
     table = {}
     for name in list_files(root):
-        table[name] = outcome_of(root / name)
+        table[name] = outcome_of(root, name)
         if table[name]["outcome"] != "refused" or suffix_of(name) not in SCENES:
             continue
         if peer_reads(root / name):

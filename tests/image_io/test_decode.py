@@ -147,6 +147,11 @@ def test_orientations_are_applied(kind, orientation):
     np.testing.assert_array_equal(decode(save(oriented(orientation), kind, **options)), OPAQUE)
 
 
+def test_a_ktx2_image_is_refused_with_a_way_to_convert_it():
+    with pytest.raises(SceneError, match="is a KTX2 image; save it as PNG"):
+        decode(b"\xabKTX 20\xbb\r\n\x1a\n")
+
+
 def test_orientation_of_a_jpeg_is_applied():
     exif = PIL.Image.Exif()
     exif[EXIF_ORIENTATION] = 6

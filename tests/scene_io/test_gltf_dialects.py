@@ -191,6 +191,34 @@ def test_images_that_cannot_be_read_are_left_out(document: Any, texture: Any, re
     assert warning.severity == "unsupported"
 
 
+def test_a_texture_in_an_unreadable_format_has_its_fallback() -> None:
+    """KHR_texture_basisu: the source outside the extension is for programs without it."""
+    glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}})
+    glb.texture(np.full((2, 2, 3), (255, 0, 0)))
+    glb.document["images"].append({"bufferView": glb.view(b"\xabKTX 20\xbb\r\n\x1a\n"), "mimeType": "image/ktx2"})
+    glb.document["textures"][0]["extensions"] = {"KHR_texture_basisu": {"source": 1}}
+    glb.document["extensionsUsed"] = ["KHR_texture_basisu"]
+    scene = imported(glb)
+    np.testing.assert_array_equal(scene.materials[0].textures["diffuse"].pixels[0, 0], [255, 0, 0])
+    assert scene.warnings == ()
+
+
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "WEBP"])
+def test_orientations_in_metadata_are_ignored(kind: str) -> None:
+    """glTF defines no orientation: texture coordinates are of the pixels as they are stored."""
+    stored = np.zeros((16, 8, 3), np.uint8)
+    stored[:8, :, 0] = 255
+    exif, encoded = Image.Exif(), io.BytesIO()
+    exif[274] = 6
+    Image.fromarray(stored).save(encoded, kind, exif=exif, quality=100)
+    glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}})
+    glb.document["images"] = [{"bufferView": glb.view(encoded.getvalue())}]
+    glb.document["textures"] = [{"source": 0}]
+    pixels = imported(glb).materials[0].textures["diffuse"].pixels
+    assert pixels.shape == (16, 8, 3)
+    assert pixels[2, 4, 0] > 200 > 50 > pixels[13, 4, 0]
+
+
 def test_an_image_that_is_too_large_is_left_out() -> None:
     encoded = io.BytesIO()
     Image.new("L", (8_200, 1)).save(encoded, "PNG")

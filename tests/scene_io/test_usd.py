@@ -446,3 +446,48 @@ def test_skinned_meshes_are_in_their_pose() -> None:
     )"""
     scene = imported(usda(SKELETON % quad("Skin", skin, 'prepend apiSchemas = ["SkelBindingAPI"]')))
     np.testing.assert_allclose(bounds(scene)[0], [-1, 3, 0], atol=1e-6)
+
+
+MOVING = """double3 xformOp:translate.timeSamples = {10: (3, 0, 0), 20: (9, 0, 0)}
+    uniform token[] xformOpOrder = ["xformOp:translate"]"""
+
+
+@pytest.mark.parametrize(("time", "x"), [(10.0, 3), (12.5, 4.5), (20.0, 9), (99.0, 9), (-5.0, 3)])
+def test_the_time_code_of_the_options(time: float, x: float) -> None:
+    for metadata in ("", "startTimeCode = 10\nendTimeCode = 15\ntimeCodesPerSecond = 5"):
+        scene = imported(usda(quad(properties=MOVING), metadata), options=ImportOptions(time=time))
+        assert bounds_of(scene.meshes[0]) == pytest.approx((x - 1, x + 1))
+        assert scene.warnings == (f"The scene is shown at time code {time:g}; its animation has 10 to 20.",)
+
+
+def test_animations_that_are_not_shown_are_said() -> None:
+    """The range in the metadata does not matter: values may lie outside, or be missing."""
+    ignored = ("The animation is ignored: the scene is shown at its first time.",)
+    assert imported(usda(quad(properties=MOVING))).warnings == ignored
+    assert imported(usda(quad(), "startTimeCode = 10\nendTimeCode = 20")).warnings == ()
+    still = imported(usda(quad()), options=ImportOptions(time=3))
+    assert still.warnings == ("The file has no animation; its time code 3 has no effect.",)
+
+
+def test_skinned_meshes_follow_the_animation_of_their_skeleton() -> None:
+    skin = """rel skel:skeleton = </Figure/Bones>
+    int[] primvars:skel:jointIndices = [0] (
+        interpolation = "constant"
+        elementSize = 1
+    )
+    float[] primvars:skel:jointWeights = [1] (
+        interpolation = "constant"
+        elementSize = 1
+    )"""
+    walk = """def SkelAnimation "Walk" {
+        uniform token[] joints = ["Hip"]
+        float3[] translations.timeSamples = {0: [(0, 0, 0)], 10: [(0, 20, 0)]}
+        quatf[] rotations = [(1, 0, 0, 0)]
+        half3[] scales = [(1, 1, 1)]
+    }"""
+    figure = SKELETON % (quad("Skin", skin, 'prepend apiSchemas = ["SkelBindingAPI"]') + walk)
+    figure = figure.replace(
+        "uniform token[] joints", "rel skel:animationSource = </Figure/Walk>\n uniform token[] joints", 1
+    )
+    scene = imported(usda(figure), options=ImportOptions(time=2.5))
+    np.testing.assert_allclose(bounds(scene)[0], [-1, 4, 0], atol=1e-5)

@@ -205,3 +205,60 @@ def test_damaged_bytes_are_an_error_that_says_so() -> None:
     for data in (b"PXR-USDC" + random, b"#usda 1.0\n" + random, b"PXR-USDC", b"#usda 9.9\n"):
         with pytest.raises(SceneError, match=r"damaged|no triangles"):
             imported(data)
+
+
+def test_layers_above_the_scene_are_read_within_an_archive_or_an_upload(tmp_path: Path) -> None:
+    root = usda("", 'subLayers = [@../_common/chair.usda@]\ndefaultPrim = "Chair"')
+    files = {"set/stages/root.usda": root, "set/_common/chair.usda": chair()}
+    assert names(import_scene(zipped(files), "test", WHITE)) == ["Seat"]
+    (tmp_path / "upload").write_bytes(chair())
+    uploaded = UploadedFiles({"set/_common/chair.usda": tmp_path / "upload"}, "set/stages/root.usda")
+    assert names(import_scene(root, "test", WHITE, uploaded)) == ["Seat"]
+    above = usda(quad(), "subLayers = [@../../../secret.usda@]")
+    scene = import_scene(zipped({"set/stages/root.usda": above}), "test", WHITE)
+    assert any("is outside the scene's folder" in warning for warning in scene.warnings)
+
+
+def test_layers_below_a_root_are_read(tmp_path: Path) -> None:
+    files = {"a/root.usda": usda("", "subLayers = [@../b/look.usda@]"), "maps/checker.png": CHECKER}
+    files["b/look.usda"] = usda(painted(RGB, texture("Image", "../maps/checker.png")))
+    for name, data in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    scene = import_scene(tmp_path / "a" / "root.usda", "test", WHITE, Folder(tmp_path / "a", tmp_path))
+    assert "diffuse" in scene.materials[0].textures
+    assert scene.warnings == ()
+
+
+@pytest.mark.parametrize(
+    "attribute",
+    [
+        'token size = "x"',
+        "asset size = @a.png@",
+        "float[] size = [1]",
+        "point3f size = (1, 2, 3)",
+        'string size.timeSamples = {0: "x"}',
+    ],
+)
+def test_attributes_of_a_wrong_type_have_the_value_of_their_schema(attribute: str) -> None:
+    scene = imported(usda(f'def Cube "Box" {{\n{attribute}\n}}\n{quad()}'))
+    assert sorted(names(scene)) == ["Box", "Quad"]
+    (box,) = [mesh for mesh in scene.meshes if mesh.name == "Box"]
+    assert float(box.positions.max()) == 1  # half of the default, 2
+    (warning,) = scene.warnings
+    kind = attribute.split()[0]
+    assert warning == f"Ignored “size” of “Box”: it is {kind}, unlike its schema."
+
+
+def test_other_precisions_and_integers_are_read() -> None:
+    body = 'def Cube "A" {\nhalf size = 4\n}\ndef Cube "B" {\nint size = 4\n}'
+    points = quad().replace("point3f[]", "double3[]")
+    scene = imported(usda(body + points))
+    assert [float(mesh.positions.max()) for mesh in scene.meshes] == [2, 2, 1]
+    assert scene.warnings == ()
+
+
+def test_metadata_of_a_wrong_type_have_their_default() -> None:
+    scene = imported(usda(quad(), "metersPerUnit = {}"))
+    assert float(scene.meshes[0].positions.max()) == pytest.approx(0.01)  # centimeters
+    assert scene.warnings == ("Ignored “metersPerUnit” of the stage: it has the wrong type.",)

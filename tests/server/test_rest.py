@@ -66,15 +66,17 @@ def test_import_options_are_applied_and_returned(client: TestClient) -> None:
         "recenter": "auto",
         "light_unit": "file",
         "scene_name": "",
+        "time": None,
     }
     options = {"up": "z", "unit": "cm", "recenter": "always", "light_unit": "W/sr", "scene_name": "B"}
+    options["time"] = 1.25
     created = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}, data=options)
     assert created.status_code == 201, created.text
     scene = client.get(f"/api/scenes/{created.json()['id']}").json()
     assert scene["import_options"] == options
     assert scene["id"] != plain["id"]
-    refused = client.post("/api/scenes", files={"scene": ("flat.obj", obj)}, data={"up": "x"})
-    assert refused.status_code == 422
+    for refused in ({"up": "x"}, {"time": "nan"}, {"time": "soon"}):
+        assert client.post("/api/scenes", files={"scene": ("flat.obj", obj)}, data=refused).status_code == 422
 
 
 def test_built_in_scenes_are_listed_and_imported_by_name(client: TestClient) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from relume.archives.bounded import open_bounded
+from relume_cli.companion_files import Root, open_companions
 from relume_cli.options import Data, check_readable
 from relume_cli.terminal.printing import Json, print_result
 
@@ -27,6 +28,7 @@ def material_import(
     ],
     name: Annotated[str | None, typer.Option(help="Name of the material. [default: file name]")] = None,
     error: Annotated[float, typer.Option(help="BTF: relative RMS error allowed in compression.")] = 0.05,
+    root: Root = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
@@ -44,7 +46,7 @@ def material_import(
     check_readable("FILE", file)
     folder, asset_name = open_settings(data).data, check_name(name or file.stem)
     if _is_materialx(file):
-        _import_materialx(folder, file, asset_name, as_json=as_json)
+        _import_materialx(folder, file, asset_name, root, as_json=as_json)
         return
     if file.suffix.lower() in _BTFS:
         _import_btf(folder, file, asset_name, error, as_json=as_json)
@@ -71,13 +73,13 @@ def _is_materialx(file: Path) -> bool:
     return any(name.lower().endswith(".mtlx") for name in names)
 
 
-def _import_materialx(folder: Path, file: Path, name: str, *, as_json: bool) -> None:
+def _import_materialx(folder: Path, file: Path, name: str, root: Path | None, *, as_json: bool) -> None:
     from relume.imported_materials.material_store import store_materials
-    from relume.scene_io.referenced_files import Folder
     from relume_worker.paths import images_path, imported_materials_path
 
     target = imported_materials_path(folder)
-    record = store_materials(target, images_path(folder), file, name, Folder(file.parent))
+    with open_companions(file, root) as companions:
+        record = store_materials(target, images_path(folder), file, name, companions)
     materials = [{"name": material.name, **material.look} for material in record.materials]
     warnings = [warning.document() for warning in record.warnings]
     document = {"id": record.id, "name": record.name, "materials": materials, "warnings": warnings}

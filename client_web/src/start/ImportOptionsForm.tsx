@@ -1,7 +1,7 @@
 /** A field for each import option. */
 import { useId } from "preact/hooks";
 import type { ImportOptions } from "../protocol";
-import { IMPORT_OPTIONS } from "./importOptions";
+import { IMPORT_OPTIONS, type ImportOption } from "./importOptions";
 
 const MAX_TEXT = 200; // characters, the server's limit
 
@@ -12,31 +12,31 @@ interface ImportOptionsFormProps {
 
 export function ImportOptionsForm({ options, onChange }: ImportOptionsFormProps) {
   const form = useId();
-  const change = (key: keyof ImportOptions) => (event: { currentTarget: { value: string } }) =>
-    onChange({ ...options, [key]: event.currentTarget.value });
+  const field = ({ key, choices }: ImportOption) => {
+    const change = (event: { currentTarget: { value: string } }) => {
+      const { value } = event.currentTarget;
+      onChange({ ...options, [key]: key !== "time" ? value : value === "" ? null : Number(value) });
+    };
+    const common = { id: `${form}-${key}`, value: options[key] ?? "", onChange: change };
+    if (key === "time") return <input {...common} type="number" step="any" placeholder="Rest pose" />;
+    if (choices.length === 0) return <input {...common} maxLength={MAX_TEXT} placeholder="As in file" />;
+    return (
+      <select {...common}>
+        {choices.map(({ value, label }) => (
+          <option key={value} value={value ?? ""}>
+            {label}
+          </option>
+        ))}
+      </select>
+    );
+  };
   return (
     <fieldset class="import-options">
       <legend>Import options</legend>
-      {IMPORT_OPTIONS.map(({ key, label, help, choices }) => (
-        <label key={key} for={`${form}-${key}`} title={help}>
-          {label}
-          {choices.length > 0 ? (
-            <select id={`${form}-${key}`} value={options[key]} onChange={change(key)}>
-              {choices.map((choice) => (
-                <option key={choice.value} value={choice.value}>
-                  {choice.label}
-                </option>
-              ))}
-            </select>
-          ) : (
-            <input
-              id={`${form}-${key}`}
-              value={options[key]}
-              maxLength={MAX_TEXT}
-              placeholder="As in file"
-              onChange={change(key)}
-            />
-          )}
+      {IMPORT_OPTIONS.map((option) => (
+        <label key={option.key} for={`${form}-${option.key}`} title={option.help}>
+          {option.label}
+          {field(option)}
         </label>
       ))}
     </fieldset>

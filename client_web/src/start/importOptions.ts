@@ -5,7 +5,7 @@ export interface ImportOption<Key extends keyof ImportOptions = keyof ImportOpti
   key: Key;
   label: string;
   help: string;
-  /** None for a text. */
+  /** None for a text or a number. */
   choices: readonly { value: ImportOptions[Key]; label: string }[];
 }
 
@@ -53,15 +53,17 @@ const OPTIONS: { readonly [Key in keyof ImportOptions]: Omit<ImportOption<Key>, 
     ],
   },
   scene_name: { label: "Scene", help: "Name or number of one scene, of a glTF file with several", choices: [] },
+  time: { label: "Time", help: "Moment of the animation: seconds, or the time code of USD", choices: [] },
 };
+const NO_TEXT: Partial<ImportOptions> = { scene_name: "", time: null };
 
 export const IMPORT_OPTIONS: readonly ImportOption[] = Object.entries(OPTIONS).map(
   ([key, option]) => ({ key, ...option }) as ImportOption,
 );
 
-/** The first choice of each option; no text. */
+/** The first choice of each option; no text, no number. */
 export const DEFAULT_OPTIONS = Object.fromEntries(
-  IMPORT_OPTIONS.map(({ key, choices }) => [key, choices[0]?.value ?? ""]),
+  IMPORT_OPTIONS.map(({ key, choices }) => [key, choices[0]?.value ?? NO_TEXT[key]]),
 ) as unknown as ImportOptions;
 
 /** The options that are not the defaults, as text: "Up axis +Z, Unit Millimeters"; empty without any. */

@@ -14,6 +14,7 @@ from relume.assets.environments.radiance_file import is_radiance, read_radiance_
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported, with_subject
 from relume.image_io.downsample import downsample
+from relume.image_io.fill_texels import fill_from_neighbors
 from relume.image_io.orientation import TRANSPOSED, orient
 from relume.image_io.primaries import convert
 from relume.image_io.read_linear import EXR_MAGIC, LinearReader
@@ -36,8 +37,9 @@ def read_environment(source: str | Path | bytes, name: str, max_width: int = SCE
         max_width: limit in texels; wider maps are scaled down to it.
     Returns:
         The environment, equirectangular and in linear Rec. 709 for any projection and any primaries of the file, with
-        one warning for each kind of change: NaN texels become black, infinite ones the largest number, negative values
-        0, radiance is clamped to 1e6, other projections are resampled, and wide maps are scaled down.
+        one warning for each kind of change: NaN texels become the mean of valid neighbors, infinite ones the largest
+        number, negative values 0, radiance is clamped to 1e6, other projections are resampled, and wide maps are scaled
+        down.
     Raises:
         SceneError: the file is missing, empty, damaged, too large, black, no panorama, or neither .hdr nor .exr.
     """
@@ -84,7 +86,8 @@ class _MapReader:
         if self._num_broken == self._num_texels:
             raise SceneError(f"no texel of {label} is a number; render or export it again")
         if self._num_broken:
-            warnings.append(unsupported(f"{self._num_broken:,} NaN texels of {environment} were made black."))
+            message = f"{self._num_broken:,} NaN texels of {environment} were replaced by the mean of their neighbors."
+            warnings.append(unsupported(message))
         if self._num_negative:
             warnings.append(approximated(f"{self._num_negative:,} negative texels of {environment} were set to 0."))
         if self._is_bright:
@@ -141,14 +144,14 @@ class _MapReader:
         )
 
     def _repair(self, pixels: F32) -> F32:
-        broken = np.isnan(pixels).any(axis=-1, keepdims=True)
-        self._num_texels += broken.size
-        if broken.any():
-            self._num_broken += int(broken.sum())
-            pixels = np.where(broken, np.float32(0), pixels)
+        is_broken = np.asarray(np.isnan(pixels).any(axis=-1))
+        self._num_texels += is_broken.size
         self._num_negative += int((pixels < 0).any(axis=-1).sum())
         self._is_bright |= bool((pixels > MAX_RADIANCE).any())
         np.clip(pixels, 0, MAX_RADIANCE, out=pixels)  # in place: a map that is not downsampled may have 1.6 GB
+        if is_broken.any():
+            self._num_broken += int(is_broken.sum())
+            fill_from_neighbors(pixels, is_broken)
         return pixels
 
     def _equirectangular(self, pixels: F32) -> F32:

@@ -14,12 +14,13 @@ from relume.core.import_warnings import ImporterWarning
 from relume.scene_io.gltf.tolerant import GltfObjects
 
 MAX_COUNT = 2**32 - 1
+MAX_WEIGHTS = 10_000
 Index = int  # is checked when it is used
 Indices = Annotated[tuple[Index, ...], Field(max_length=100_000, fail_fast=True)]
 Bytes = Annotated[int, Field(ge=0, lt=2**40)]
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e30, le=1e30)]
 Factor = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
-Weights = Annotated[tuple[Number, ...], Field(max_length=10_000, fail_fast=True)]
+Weights = Annotated[tuple[Number, ...], Field(max_length=MAX_WEIGHTS, fail_fast=True)]
 Name = Annotated[str, Field(max_length=65_536)]
 Names = Annotated[list[Name], Field(max_length=1_000, fail_fast=True)]
 Extensions = Annotated[dict[str, Any], BeforeValidator(lambda value: value if value else {})]  # [] of some exporters
@@ -160,12 +161,34 @@ class Node(GltfPrimitivePart):
     weights: Weights = ()
 
 
+class AnimationSampler(GltfPrimitivePart):
+    input: Index
+    output: Index
+    interpolation: Literal["LINEAR", "STEP", "CUBICSPLINE"] = "LINEAR"
+
+
+class AnimationTarget(GltfPrimitivePart):
+    node: Index | None = None
+    path: Name = ""
+
+
+class AnimationChannel(GltfPrimitivePart):
+    sampler: Index
+    target: AnimationTarget
+
+
+class Animation(GltfPrimitivePart):
+    channels: Annotated[list[AnimationChannel], Field(max_length=100_000, fail_fast=True)] = []
+    samplers: Annotated[list[AnimationSampler], Field(max_length=100_000, fail_fast=True)] = []
+
+
 class SceneRoot(GltfPrimitivePart):
     nodes: Indices = ()
 
 
 LIMITS = {
     "accessors": 1_000_000,
+    "animations": 10_000,
     "buffers": 10_000,
     "bufferViews": 1_000_000,
     "cameras": 1_000,
@@ -214,6 +237,7 @@ class Document:
         self.root, self._warnings = root, warnings
         self._primitives: dict[int, GltfObjects[Primitive]] = {}
         self.accessors = GltfObjects(Accessor, root.accessors, "accessor", warnings)
+        self.animations = GltfObjects(Animation, root.animations, "animation", warnings)
         self.buffers = GltfObjects(Buffer, root.buffers, "buffer", warnings)
         self.buffer_views = GltfObjects(BufferView, root.bufferViews, "buffer view", warnings)
         self.cameras = GltfObjects(GltfCamera, root.cameras, "camera", warnings)

@@ -190,7 +190,8 @@ class _AttributeReader:
                 self._warnings.append(unsupported(f"A morph target of {self._label} was left out: {problem}."))
                 continue
             values = values.copy()
-            values[:, :width] += np.float32(weight) * displacements
+            with np.errstate(over="ignore"):  # huge positions are left out
+                values[:, :width] += np.float32(weight) * displacements
         return values
 
 

@@ -30,7 +30,7 @@ class ImageReader:
         self._warnings = warnings
         self._decoded: dict[int, U8] = {}
         self._unusable: set[int] = set()  # textures
-        self._decoder = Decoder()
+        self._decoder = Decoder(applies_orientation=False)  # texture coordinates are of the pixels as stored
 
     def is_usable(self, index: int, label: str) -> bool:
         """True if a texture can be read; else a warning says why, once a texture."""

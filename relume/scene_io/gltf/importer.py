@@ -22,6 +22,7 @@ from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.accessors import AccessorReader
+from relume.scene_io.gltf.animation import pose_nodes
 from relume.scene_io.gltf.cameras import framing_camera, make_slug, rigid_frame
 from relume.scene_io.gltf.container import GltfContainer, read_container
 from relume.scene_io.gltf.degenerate_transforms import (
@@ -65,7 +66,7 @@ def import_gltf(
         name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: files that it may refer to; None for none.
-        options: `light_unit` and `scene_name`; None for the defaults.
+        options: `light_unit`, `scene_name` and `time`; None for the defaults.
 
     Returns:
         The scene, with node transforms applied: one mesh per primitive and node, cameras or one view "front", lights
@@ -101,6 +102,10 @@ class _SceneBuilder:
         self._light_reader = LightReader(container.document, self._collector, options.light_unit, self.warnings)
         self._geometry: dict[PrimitiveKey, GltfGeometry | None] = {}
         self._material_index: dict[tuple[int | None, Choices], int] = {}
+        if options.time is None:
+            self._warn_animations()
+        else:
+            pose_nodes(self._document, options.time, self._accessors, self.warnings)
         self._nodes = place_nodes(
             self._document, scene_roots(self._document, options.scene_name, self.warnings), self.warnings
         )
@@ -116,7 +121,6 @@ class _SceneBuilder:
         self.materials: list[ReadMaterial] = []
         self.meshes: list[Mesh] = []
         self.cameras: list[Camera] = []
-        self._warn_animations()
         self._list_primitives()
         for placed in self._nodes:
             self._add_node(placed)

@@ -53,6 +53,10 @@ class GltfObjects(Generic[M]):
             raise item
         return item
 
+    def replace(self, index: int, item: M) -> None:
+        """Set an object that was read."""
+        self._objects[index] = item
+
     def used(self) -> list[tuple[str, Any]]:
         """Return label and JSON of each object that was read."""
         return [(self.label(index), self._items[index]) for index in self._objects if 0 <= index < len(self._items)]

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from relume.core.import_warnings import ImporterWarning, ignored, quote, unsupported
+from relume.scene_io.gltf.animation import POINTER
 from relume.scene_io.gltf.compression import DRACO, MESHOPT
 from relume.scene_io.gltf.document import Document
 from relume.scene_io.gltf.images import UNREADABLE_FORMATS
@@ -22,6 +23,7 @@ SUPPORTED_EXTENSIONS = {
     "KHR_lights_punctual",
     "KHR_materials_variants",
     VISIBILITY,
+    POINTER,  # has its own sentence
     *MATERIAL_EXTENSIONS,
 }
 NOT_VISIBLE = (

@@ -19,6 +19,7 @@ from relume.scene_io.obj_ply.material_maker import printable, read_companion
 from relume.scene_io.referenced_files import Archive, Companions
 from relume.scene_io.root_layer import FORMAT_ARGUMENTS, layer_paths, open_layer
 from relume.scene_io.usd.materialx_layers import write_materialx_layer
+from relume.scene_io.usd.value_types import remove_mistyped
 from relume.scene_io.zip_scene import LAYER_SUFFIXES, open_zip
 
 MATERIALX_SUFFIX = ".mtlx"
@@ -108,6 +109,7 @@ class LayerFolder:
         paths = {path: self._private_path(path, companions, folder, depth) for path in layer_paths(layer)}
         UsdUtils.ModifyAssetPaths(layer, lambda path: paths.get(path, ""))
         _remove_clips(layer, self._warnings)
+        remove_mistyped(layer, self._warnings)
 
     def _private_path(self, path: str, companions: Companions, folder: str, depth: int) -> str:
         """The private path of a file that a layer names; empty if it is missing."""

@@ -18,7 +18,11 @@ def bake_skinning(stage: Any, time: Any, warnings: list[ImporterWarning]) -> Non
     from pxr import Gf, Tf, Usd, UsdSkel
 
     stage.SetEditTarget(stage.GetSessionLayer())
-    for prim in list(Usd.PrimRange(stage.GetPseudoRoot(), Usd.PrimDefaultPredicate)):
+    prims = list(Usd.PrimRange(stage.GetPseudoRoot(), Usd.PrimDefaultPredicate))
+    for prim in prims:
+        if prim.IsA(UsdSkel.Animation):
+            _add_sample(prim, time)
+    for prim in prims:
         if not prim.IsA(UsdSkel.Root):
             continue
         try:
@@ -28,3 +32,10 @@ def bake_skinning(stage: Any, time: Any, warnings: list[ImporterWarning]) -> Non
         if not is_baked:
             message = f"The skeleton of {quote(prim.GetName())} cannot be used; its meshes are in their bind pose."
             warnings.append(unsupported(message))
+
+
+def _add_sample(animation: Any, time: Any) -> None:
+    """Give an animation a sample at a time: UsdSkel bakes the times of samples alone."""
+    for attribute in animation.GetAuthoredAttributes():
+        if attribute.GetNumTimeSamples() and (value := attribute.Get(time)) is not None:
+            attribute.Set(value, time)

@@ -78,10 +78,10 @@ def import_usd(
         name: name of the scene, shown to users.
         environment: replaces the dome light of the file; None for that, or the built-in studio.
         companions: files that the layers may name; None for none.
-        options: `up` and `unit` are of the stage where they are "file"; see `recenter` there.
+        options: `up` and `unit` are of the stage where they are "file"; see `recenter` and `time` there.
 
     Returns:
-        The scene at the first time of the file, in meters with +Y up as far as the options say "file".
+        The scene at one time, in meters with +Y up as far as the options say "file".
 
     Raises:
         SceneError: the file is unusable, or usd-core is not installed; the message says what to do.
@@ -118,8 +118,9 @@ class _StageReader:
         from pxr import Usd, UsdGeom
 
         self._stage, self._options, self._warnings = stage, options, warnings
-        has_range = stage.HasAuthoredTimeCodeRange()
-        self._time = Usd.TimeCode(stage.GetStartTimeCode()) if has_range else Usd.TimeCode.EarliestTime()
+        self._samples = {time for layer in stage.GetUsedLayers() for time in layer.ListAllTimeSamples()}
+        start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else min(self._samples, default=0.0)
+        self._time = Usd.TimeCode(start if options.time is None else options.time)
         bake_skinning(stage, self._time, warnings)
         self._transforms = UsdGeom.XformCache(self._time)
         self._images = SurfaceImages(LayerImages(layers, warnings), warnings)
@@ -427,8 +428,18 @@ class _StageReader:
                 if others:
                     message = f"{quote(prim.GetName())} is shown in its {variant_set.GetName()[:80]} {quote(chosen)}"
                     self._warnings.append(ignored(f"{message}; the file also has {others}."))
-        if self._stage.HasAuthoredTimeCodeRange():
+        self._warn_time()
+
+    def _warn_time(self) -> None:
+        time = self._options.time
+        if not self._samples and time is not None:
+            self._warnings.append(ignored(f"The file has no animation; its time code {time:g} has no effect."))
+        elif self._samples and time is None:
             self._warnings.append(ignored("The animation is ignored: the scene is shown at its first time."))
+        elif self._samples:
+            first, last = min(self._samples), max(self._samples)
+            message = f"The scene is shown at time code {time:g}; its animation has {first:g} to {last:g}."
+            self._warnings.append(ignored(message))
 
 
 def _bounds(shape: _Shape) -> tuple[F64, F64]:

@@ -58,6 +58,9 @@ FileUnit = Annotated[Unit, Form(description="unit of the file; auto guesses it f
 Recentered = Annotated[Recenter, Form(description="whether positions become relative to the middle of the scene")]
 FileLightUnit = Annotated[LightUnit, Form(description="unit of the file's point, spot and directional lights")]
 FileScene = Annotated[str, Form(max_length=200, description="name or number of a scene, of a glTF file with several")]
+FileTime = Annotated[
+    float | None, Form(allow_inf_nan=False, description="moment of the animation: seconds in glTF, time code in USD")
+]
 Companions = Annotated[
     list[UploadFile],
     File(description="files that the scene references; file names include the folders"),
@@ -80,6 +83,7 @@ async def import_scene(
     recenter: Recentered = "auto",
     light_unit: FileLightUnit = "file",
     scene_name: FileScene = "",
+    time: FileTime = None,
 ) -> SceneBody:
     """Import a scene in a separate process; the body has a summary, and a warning for each unsupported feature."""
     if not name.isprintable():
@@ -99,7 +103,9 @@ async def import_scene(
         request = ImportRequest.create(
             services.settings, "scene", file, called, environment_path, scene.filename or "", companion_paths
         )
-        options = ImportOptions(up=up, unit=unit, recenter=recenter, light_unit=light_unit, scene_name=scene_name)
+        options = ImportOptions(
+            up=up, unit=unit, recenter=recenter, light_unit=light_unit, scene_name=scene_name, time=time
+        )
         return replace(request, ground=ground, options=options.document())
 
     identity = await services.import_queue.import_file(reservation, make_request)

@@ -88,10 +88,25 @@ def test_options_turn_and_scale_the_scene_in_the_dialog(start: Page, server: Ser
         "recenter": "auto",
         "light_unit": "file",
         "scene_name": "",
+        "time": None,
     }
     start.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
     assert start.evaluate("document.activeElement.closest('main') !== null || document.activeElement === document.body")
+
+
+def test_the_time_of_an_animation_is_a_number_that_can_be_taken_back(start: Page, server: Server, pillar: Path) -> None:
+    dialog = import_pillar(start, pillar)
+    time, status = dialog.get_by_label("Time"), dialog.get_by_role("status").first
+    time.fill("1.5")
+    time.press("Enter")
+    expect(status).to_have_text("Imported with Time 1.5.")
+    (scene,) = (each for each in server.call("/api/scenes") if each["name"] == "pillar")
+    assert scene["import_options"]["time"] == 1.5
+    time.fill("")
+    time.press("Enter")
+    expect(dialog.get_by_text("Imported with")).to_have_count(0)
+    expect(time).to_have_value("")
 
 
 def test_a_refused_option_is_explained_and_taken_back(start: Page, pillar: Path) -> None:

@@ -51,7 +51,8 @@ export function uploadScene(upload: SceneUpload, progress: (fraction: number) =>
   if (upload.environment !== null) form.append("environment", upload.environment);
   form.append("name", upload.name);
   form.append("ground", String(upload.ground));
-  for (const [option, value] of Object.entries({ ...upload.options })) form.append(option, value);
+  for (const [option, value] of Object.entries({ ...upload.options }))
+    if (value !== null) form.append(option, String(value));
   return postForm("/api/scenes", form, progress) as Promise<SceneBody>;
 }
 
