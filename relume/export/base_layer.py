@@ -74,7 +74,7 @@ def pbr_surface(parameters: SurfaceParameters) -> PbrSurface:
     """Return the surface that parameters without images mean."""
     metallic, specular = float(parameters.metallic), float(parameters.specular)  # type: ignore[arg-type]
     base, color = np.array(parameters.base_color), np.array(parameters.specular_color)
-    dielectric = np.minimum(_reflectance(parameters.ior) * color, 1)
+    dielectric = np.minimum(normal_reflectance(parameters.ior) * color, 1)
     reflectance = dielectric_reflectance(float(dielectric.max()) * specular, specular)
     albedo = base * (1 - metallic) * (1 - float(parameters.transmission))  # type: ignore[arg-type]
     f0, f90 = lerp(specular * dielectric, base, metallic), lerp(specular, 1, metallic)
@@ -95,11 +95,15 @@ def _uniform_layer(surface: PbrSurface, glass: Glass | None) -> dict[str, Any]:
 
 def _dielectric_layer(albedo: F64, f0: F64, f90: float, glass: Glass | None) -> dict[str, Any]:
     relative = f0 / f90 if f90 > 0 else np.zeros(3)
-    f = min(float(relative.max()), _MAX_F0) if glass is None else _reflectance(glass.ior)
+    f = min(float(relative.max()), _MAX_F0) if glass is None else normal_reflectance(glass.ior)
     color = relative / f if f > 0 else np.ones(3)
     reflectance = dielectric_reflectance(min(float(relative.max()), 1.0) * f90, f90)
     base = albedo / (1 - reflectance)
-    layer = {"specular": f90, "specular_color": rgb(color), "ior": _index(f) if glass is None else glass.ior}
+    layer = {
+        "specular": f90,
+        "specular_color": rgb(color),
+        "ior": index_of_refraction(f) if glass is None else glass.ior,
+    }
     if glass is None:
         return layer | {"base_color": rgb(np.minimum(base, 1)), "metallic": 0.0}
     total = base + glass.tint
@@ -202,11 +206,12 @@ def _blend_error(albedo: NDArray[Any], f0: NDArray[Any], base: F64, metallic: F6
     return float(max(np.abs(diffuse - albedo).max(), np.abs(lerp(DIELECTRIC, base, metallic) - f0).max()))
 
 
-def _reflectance(ior: float) -> float:
+def normal_reflectance(ior: float) -> float:
+    """Reflectance at normal incidence of an index of refraction."""
     return ((ior - 1) / (ior + 1)) ** 2
 
 
-def _index(reflectance: float) -> float:
+def index_of_refraction(reflectance: float) -> float:
     """Index of refraction of a reflectance at normal incidence."""
     root = reflectance**0.5
     return round((1 + root) / (1 - root), 6)

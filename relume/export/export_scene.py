@@ -10,6 +10,8 @@ from relume.core.errors import ParameterError
 from relume.export.export_document import ExportDocument
 from relume.export.export_report import ExportReport, make_report
 from relume.export.write_glb import omitted_from_glb, write_glb
+from relume.export.write_materialx import omitted_from_materialx, write_materialx
+from relume.export.write_usd import omitted_from_usd, write_usd
 
 
 class ExportFormat(NamedTuple):
@@ -29,6 +31,8 @@ class ExportFormat(NamedTuple):
 
 FORMATS = {
     "glb": ExportFormat(".glb", "glTF", "model/gltf-binary", omitted_from_glb, write_glb),
+    "materialx": ExportFormat(".zip", "MaterialX", "application/zip", omitted_from_materialx, write_materialx),
+    "usd": ExportFormat(".usdz", "USD", "model/vnd.usdz+zip", omitted_from_usd, write_usd),
 }
 
 

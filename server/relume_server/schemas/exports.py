@@ -9,7 +9,7 @@ from pydantic import Field
 from relume.export.export_document import MAX_VARIANTS
 from relume_server.schemas.base import Body, Name
 
-ExportFormatName = Literal["glb"]
+ExportFormatName = Literal["glb", "materialx", "usd"]
 
 
 class ExportRequest(Body):
