@@ -125,7 +125,7 @@ class UsdMaterials:
 
     def _asset(self, value: ImageInput) -> str:
         self.files[value.file] = None
-        return f"{IMAGE_FOLDER}/{value.file}"
+        return f"./{IMAGE_FOLDER}/{value.file}"
 
 
 def omitted_from_preview(material: ExportMaterial) -> bool:

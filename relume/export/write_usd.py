@@ -200,7 +200,7 @@ class _StageWriter:
         write_image(self._folder / IMAGE_FOLDER / "environment.exr", environment.radiance)
         dome = UsdLux.DomeLight.Define(self._stage, self._path("Lights", "environment"))
         dome.GetPrim().SetDisplayName(environment.name)
-        dome.CreateTextureFileAttr(f"{IMAGE_FOLDER}/environment.exr")
+        dome.CreateTextureFileAttr(f"./{IMAGE_FOLDER}/environment.exr")
         dome.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
         dome.CreateIntensityAttr(look.intensity)
         dome.CreateColorAttr(tuple(look.color))

@@ -26,11 +26,13 @@ def exported(path: Path, scene: Scene, look: dict[str, Any] | None = None, **var
 
 
 def errors(path: Path) -> list[str]:
-    from pxr import UsdUtils
+    """Errors of all validators of USD; usd-core comes without MaterialX, so that it does not know its shaders."""
+    from pxr import Usd, UsdValidation
 
-    checker = UsdUtils.ComplianceChecker()
-    checker.CheckCompliance(str(path))
-    return [*checker.GetErrors(), *checker.GetFailedChecks()]
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    findings = UsdValidation.ValidationContext(validators).Validate(Usd.Stage.Open(str(path)))
+    messages = [each.GetMessage() for each in findings if each.GetType() == UsdValidation.ValidationErrorType.Error]
+    return [message for message in messages if "shaderId 'ND_" not in message]
 
 
 def test_the_package_is_compliant(tmp_path: Path) -> None:
@@ -50,7 +52,10 @@ def test_geometry_cameras_and_lights_are_read_again(tmp_path: Path) -> None:
         "emission": [3.0, 2.0, 1.0],
     }
     again = exported(tmp_path / "a.usdz", scene, {"lights": {"Panel": panel}})
-    for mesh, read in zip(scene.meshes, again.meshes, strict=True):
+    originals = {mesh.name: mesh for mesh in scene.meshes}
+    assert originals.keys() == {mesh.name for mesh in again.meshes}
+    for read in again.meshes:
+        mesh = originals[read.name]
         corners, read_corners = mesh.positions[mesh.faces], read.positions[read.faces]
         assert read_corners == pytest.approx(corners, abs=1e-6)
         assert read.uvs[read.faces] == pytest.approx(mesh.uvs[mesh.faces], abs=1e-6)
