@@ -49,7 +49,7 @@ class GlbBuffer:
         values = np.ascontiguousarray(values)
         width = values.shape[1] if values.ndim == 2 else 1
         bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()} if has_bounds else {}
-        view = self.add_view(memoryview(values).cast("B"), target=target)
+        view = self.add_view(values.data.cast("B"), target=target)
         component = _COMPONENTS[values.dtype.str]
         accessor = {"bufferView": view, "componentType": component, "count": len(values), "type": _TYPES[width]}
         self.accessors.append(accessor | bounds)

@@ -49,7 +49,7 @@ export function SceneExportDialog({ onClose }: { onClose: () => void }) {
   const [hasVariants, setHasVariants] = useState(false);
   const [busy, setBusy] = useState(false);
   const [problem, setProblem] = useState("");
-  const [exportedLook] = useState(look.peek);
+  const [exportedLook] = useState(() => look.peek());
   useEffect(() => dialog.current?.showModal(), []);
   const id = scene.value?.id ?? "";
   const variants = hasVariants ? savedLooks.value.map(({ name }) => name) : [];
