@@ -191,10 +191,10 @@ class _GlbDocument:
         return {name: members for name, members in extensions.items() if any(members.values())}
 
 
-def _extension_names(part: Any) -> set[str]:
-    """Names of all extensions in a part of a document."""
-    children = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
-    names = set(part.get("extensions", ())) if isinstance(part, dict) else set()
+def _extension_names(member: Any) -> set[str]:
+    """Names of all extensions in a member of a document."""
+    children = member.values() if isinstance(member, dict) else member if isinstance(member, list) else ()
+    names = set(member.get("extensions", ())) if isinstance(member, dict) else set()
     return names.union(*map(_extension_names, children))
 
 

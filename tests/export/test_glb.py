@@ -323,10 +323,10 @@ def test_validator_has_no_errors(tmp_path: Path) -> None:
         pytest.skip("RELUME_GLTF_VALIDATOR does not name the folder of the npm package gltf-validator")
     anisotropic = Material("Brushed", terms_of(METAL, CoatLayer(anisotropy=0.6)))
     scene = sample_scene()
-    both = scene_of(*scene.materials, anisotropic, lights=scene.lights)
+    extended = scene_of(*scene.materials, anisotropic, lights=scene.lights)
     look = {"lights": {"Panel": {"kind": "rectangle"}}}
     red = {"materials": {"Metal": {"terms": [{"model": "lambert", "color": [0.8, 0.1, 0.1]}]}}}
-    written(tmp_path / "a.glb", both, look, red=red)
+    written(tmp_path / "a.glb", extended, look, red=red)
     command = ["node", "-e", _VALIDATE, VALIDATOR, str(tmp_path / "a.glb")]
     issues = json.loads(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
     assert issues["numErrors"] == 0, issues["messages"]
