@@ -86,7 +86,11 @@ def surface_values(surface: PbrSurface, coat: CoatLayer, turn: float, pairs: Dir
 
 
 def microfacet_widths(roughness: float, anisotropy: float, turn: float) -> tuple[float, float]:
-    """Widths α along and across the tangent, as in KHR_materials_anisotropy."""
+    """Widths α along and across the tangent, as in KHR_materials_anisotropy.
+
+    Args:
+        roughness: perceptual. anisotropy: strength. turn: 0 or π/2, of the wider side from the tangent.
+    """
     narrow = max(roughness**2, _MIN_WIDTH)
     wide = narrow + (1 - narrow) * anisotropy**2
     return (narrow, wide) if turn else (wide, narrow)
