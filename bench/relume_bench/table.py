@@ -62,6 +62,8 @@ TARGETS = {
     "assets.rmse_p90": "≤ 12 %",
     "assets.flip_median": "≤ 0.03",
     "assets.flip_p90": "≤ 0.08",
+    "export.glb_rmse": "≤ 1 %",
+    "export.errors": "≤ 0",
     "mirror.rmse": "≤ 10 %",
     "mirror.sharp_rmse": "≤ 5 %",
     "sharp.rmse_0.02": "≤ 4 %",

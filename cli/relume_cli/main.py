@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from relume_cli import audit, bake, bench, demo, environment_import, import_scene, render, serve, tokens, worker
+from relume_cli import audit, bake, bench, demo, environment_import, export, import_scene, render, serve, tokens, worker
 from relume_cli.backup import backup, restore
 from relume_cli.database import cancel, delete, listing, revision_draft, status, upgrade
 from relume_cli.error_message import error_message
@@ -44,6 +44,7 @@ app.command("bake")(bake.bake)
 app.command("status")(status.status)
 app.command("cancel")(cancel.cancel)
 app.command("render")(render.render)
+app.command("export")(export.export)
 app.command("delete")(delete.delete)
 app.command("serve", short_help="Serve the editor and the API.")(serve.serve)
 app.command("worker", short_help="Bake for servers until stopped.")(worker.worker)

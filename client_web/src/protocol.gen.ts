@@ -127,6 +127,14 @@ export interface EncodingMessage {
   quality?: number;
 }
 
+/** A scene with a look as a file. `look`: a look document, may be partial. `saved_look`: the name of a saved look, instead. `variants`: names of further saved looks, whose materials the file offers as variants. */
+export interface ExportRequest {
+  format?: "glb" | "materialx" | "usd";
+  look?: Record<string, unknown>;
+  saved_look?: string | null;
+  variants?: string[];
+}
+
 /** client → server: the pointer is in this visible view: its frames and operators have priority. */
 export interface FocusMessage {
   type: "focus";
@@ -520,6 +528,21 @@ export interface ExampleSceneBody {
   description: string;
   size: [number, number];
   method: string;
+}
+
+/** Differences between a look and its file: by material, and of the scene, a sentence each. */
+export interface ExportReportBody {
+  materials: ExportedMaterial[];
+  omitted: string[];
+}
+
+/** A material of an export. `look`: the variant; null for the exported look. `exact`: the file has the same reflectance. `error`: relative RMS error of cosine-weighted BRDF values. `omitted`: a sentence for each feature that the file does not have. */
+export interface ExportedMaterial {
+  name: string;
+  look: string | null;
+  exact: boolean;
+  error: number;
+  omitted: string[];
 }
 
 /** Exactness of an image with respect to its look, worst first; of several images, the worst counts. - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet. - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image. - INCREMENTAL: an exact image plus the approximate change of its light, or of a curve by merged lights or a subset of the samples. - NEAR_EXACT: a sum over the few nodes of a parameter, of quantized columns, or with noticeable float32 rounding; within a thousandth (relative RMS). - EXACT: the complete sum over all light that was baked. Everything below EXACT is replaced when nobody edits. The first exact image after a free camera stopped comes with the error of the image that was shown while it moved (`free_camera_error`). */

@@ -128,7 +128,7 @@ def find_base_color(
     if is_user_image(specular_texture):
         return _base_from_texture(specular_texture, load_texture(specular_texture), f0, dielectric)
     if scene_material is None or not textures:
-        return BaseColor(None, None, _solve_base_color(factor, f0), dielectric)
+        return BaseColor(None, None, solve_base_color(factor, f0), dielectric)
     return _base_from_texture("scene", _base_map(scene_material), _ONES, dielectric, scene, material)
 
 
@@ -190,12 +190,12 @@ def _base_map(scene_material: Material) -> Texture:
         reflectances = [
             scale * SRGB_TO_LINEAR[select_rows(raster.rgb(key), rows)] for key, scale in channel_color.items()
         ]
-        return np.asarray(_solve_base_color(*reflectances), np.float32)
+        return np.asarray(solve_base_color(*reflectances), np.float32)
 
     return encode_rows(values, raster.size if images else (1, 1), _ONES, raster.wrap)
 
 
-def _solve_base_color(diffuse: F64, specular: F64) -> F64:
+def solve_base_color(diffuse: F64, specular: F64) -> F64:
     """Solve for b from D and F. The mean over channels has the roots 1 - m and b / d. If both are possible values of
     1 - m, choose the one that fits the differences between channels, or else the less metallic. (..., 3) each"""
     total = diffuse + specular

@@ -62,14 +62,15 @@ def glass_of(look: Look) -> GlassOfLook:
 def with_glass(scene: Scene, glass: GlassOfLook) -> Scene:
     """Return a scene as if its file contained the glass of a look; its id then begins with the scene's."""
     by_name = dict(glass)
-    materials = tuple(_with_glass(material, by_name.get(material.name)) for material in scene.materials)
+    materials = tuple(with_glass_look(material, by_name.get(material.name)) for material in scene.materials)
     if all(material is own for material, own in zip(materials, scene.materials, strict=True)):
         return scene
     identity = digest([(name, each.model_dump()) for name, each in glass])[:16]
     return replace(scene, id=scene.id + identity, materials=materials)
 
 
-def _with_glass(material: Material, glass: GlassLook | None) -> Material:
+def with_glass_look(material: Material, glass: GlassLook | None) -> Material:
+    """Return a material with the glass of a look; itself if it is opaque or has that glass."""
     if glass is None or material.glass is None:
         return material
     edited = replace(

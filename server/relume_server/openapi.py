@@ -20,6 +20,9 @@ _SCHEMES = {
     "token": {"type": "http", "scheme": "bearer", "description": "access token, if the server requires login"},
     "cookie": {"type": "apiKey", "in": "cookie", "name": COOKIE, "description": "set by POST /api/login"},
 }
+_WITH_LOOKS = (
+    "LooksBody", "LooksRequest", "RenderRequest", "ShareBody", "ShareRequest", "ComparisonRequest", "ExportRequest",
+)  # fmt: skip
 _KEY_PARAMETER = {
     "name": HEADER,
     "in": "header",
@@ -60,7 +63,7 @@ def _description(app: FastAPI) -> dict[str, Any]:
                 if media_type.startswith(("image/", "video/")) or media_type == "application/octet-stream":
                     content["schema"] = _BINARY
     _name_binary(components["schemas"])
-    for body in ("LooksBody", "LooksRequest", "RenderRequest", "ShareBody", "ShareRequest", "ComparisonRequest"):
+    for body in _WITH_LOOKS:
         _refer_to_look(components["schemas"][body]["properties"])
     return document
 

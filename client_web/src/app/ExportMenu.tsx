@@ -1,4 +1,4 @@
-/** Export: PNG and EXR with one click each; more EXR variants, and turntables of free-camera views. */
+/** Export: PNG and EXR with one click each; more EXR variants, turntables of free-camera views, and the scene. */
 import { useState } from "preact/hooks";
 import {
   exportExr,
@@ -15,6 +15,7 @@ import { exrSpace, availableExrSpace, exrSpaces } from "../state/color";
 import { displayedFrames } from "../state/display";
 import { look } from "../state/look";
 import { hasFreeCamera, sideBySide, activeViewName } from "../state/views";
+import { SceneExportDialog } from "./SceneExportDialog";
 
 /** The exported view, named when several views are shown. */
 function exportTargetLabel(): string {
@@ -111,6 +112,7 @@ function ColorSpaceSelect() {
 
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
+  const [isExportingScene, setIsExportingScene] = useState(false);
   void displayedFrames.value;
   const isUnavailable = look.value === null || !stage.active.hasPixels;
   const busy = isUnavailable || exporting.value !== null;
@@ -163,10 +165,23 @@ export function ExportMenu() {
               </li>
             ),
           )}
+          <li>
+            <button
+              disabled={look.value === null}
+              onClick={() => {
+                setOpen(false);
+                setIsExportingScene(true);
+              }}
+            >
+              Scene…
+            </button>
+            <span>GLB, USD or MaterialX with this look</span>
+          </li>
           {hasFreeCamera.value && <TurntableSelect />}
           {exrSpaces.value.length > 0 && <ColorSpaceSelect />}
         </ul>
       )}
+      {isExportingScene && <SceneExportDialog onClose={() => setIsExportingScene(false)} />}
     </div>
   );
 }

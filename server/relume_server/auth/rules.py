@@ -32,6 +32,8 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/scenes/{scene}/ground": {"POST": EDIT},
     "/api/scenes/{scene}/thumbnail.webp": {"GET": VIEW},
     "/api/scenes/{scene}/clay.png": {"GET": VIEW},
+    "/api/scenes/{scene}/exports": {"POST": EDIT},
+    "/api/scenes/{scene}/exports/report": {"POST": EDIT},
     "/api/scenes/{scene}/cameras": {"GET": VIEW},
     "/api/scenes/{scene}/cameras/{name}": {"GET": VIEW, "PUT": EDIT, "DELETE": EDIT},
     "/api/scenes/{scene}/comments": {"GET": VIEW, "POST": EDIT},
@@ -128,6 +130,7 @@ _COMPILED: tuple[tuple[re.Pattern[str], Mapping[str, Role]], ...] = tuple(
 )
 
 _COMMENTS = compile_path("/api/scenes/{scene}/comments")[0]
+_EXPORTS = tuple(compile_path(f"/api/scenes/{{scene}}/exports{end}")[0] for end in ("", "/report"))
 
 
 def required_role(method: str, path: str) -> Role:
@@ -150,8 +153,10 @@ def is_comment(method: str, path: str) -> bool:
 
 
 def is_change(method: str, path: str) -> bool:
-    """True if a call changes shared state: an unsafe method that needs more than the role view."""
-    return method not in ("GET", "HEAD", "OPTIONS", SOCKET) and required_role(method, path) >= EDIT
+    """True if a call changes shared state: an unsafe method that needs more than the role view, other than exports."""
+    if method in ("GET", "HEAD", "OPTIONS", SOCKET) or any(pattern.match(path) for pattern in _EXPORTS):
+        return False
+    return required_role(method, path) >= EDIT
 
 
 def check_message(caller: Caller, kind: str) -> None:

@@ -1,0 +1,93 @@
+"""An export before it is written: the scene, its looks, and their materials as principled surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from relume.core.errors import ParameterError
+from relume.core.import_warnings import quote
+from relume.export.export_images import ExportImages
+from relume.export.export_materials import ExportMaterial, MaterialExporter
+from relume.look import Look, default_look, validate
+from relume.look.model import LightLook, RectangleLook
+from relume.scene.model import Scene
+
+MAX_VARIANTS = 100  # as many as imports read
+
+
+@dataclass(frozen=True)
+class ExportDocument:
+    """Everything that a writer needs.
+
+    Attributes:
+        scene: geometry, cameras and names. look: lights and environment of the file.
+        materials: as the look shows them, in the scene's order. variants: materials of further looks by their names.
+        images: images of all materials.
+    """
+
+    scene: Scene
+    look: Look
+    materials: list[ExportMaterial]
+    variants: dict[str, list[ExportMaterial]]
+    images: ExportImages
+
+    def all_materials(self) -> list[ExportMaterial]:
+        """Every material once: those of the look, then those of variants that differ from them."""
+        distinct = {id(material): material for material in self.materials}
+        for materials in self.variants.values():
+            distinct.update((id(material), material) for material in materials)
+        return list(distinct.values())
+
+    def materials_of(self, index: int) -> list[ExportMaterial]:
+        """The material `index` of the look and of all variants."""
+        return [self.materials[index], *(materials[index] for materials in self.variants.values())]
+
+    def variants_of(self, index: int) -> dict[int, list[int]]:
+        """Numbers of the variants by the number, in `all_materials`, of a replacement of material `index`."""
+        numbers = {id(material): number for number, material in enumerate(self.all_materials())}
+        replacements: dict[int, list[int]] = {}
+        for variant, materials in enumerate(self.variants.values()):
+            if materials[index] is not self.materials[index]:
+                replacements.setdefault(numbers[id(materials[index])], []).append(variant)
+        return replacements
+
+    def lights(self) -> Iterator[tuple[str, LightLook]]:
+        """Lights other than emissive materials; rectangles only if they emit."""
+        for name, light in self.look.lights.items():
+            if light.kind != "mesh" and not (isinstance(light, RectangleLook) and max(light.gain) == 0):
+                yield name, light
+
+
+def prepare_export(scene: Scene, look: Look, variants: Mapping[str, Look] | None = None) -> ExportDocument:
+    """Convert a scene's materials, without writing anything.
+
+    Args:
+        scene: the scene. look: a complete look of it. variants: further complete looks of it by name.
+    Raises:
+        ParameterError: there are too many variants. NotFoundError, SceneError: an image of a look is unavailable.
+    """
+    variants = variants or {}
+    if len(variants) > MAX_VARIANTS:
+        raise ParameterError("variants", len(variants), f"at most {MAX_VARIANTS} looks")
+    images = ExportImages()
+    exporter = MaterialExporter(scene, images)
+    by_variant = {name: exporter.materials(each) for name, each in variants.items()}
+    return ExportDocument(scene, look, exporter.materials(look), by_variant, images)
+
+
+def look_of_scene(scene: Scene, document: Mapping[str, Any], label: str) -> Look:
+    """Return the complete look of a possibly partial document.
+
+    Args:
+        scene: the scene. document: changes to its default look. label: names the look in the error.
+    Raises:
+        ParameterError: the look is invalid, or of another scene.
+    """
+    default = default_look(scene.materials, scene.lights)
+    names = document.get("materials", {})
+    if isinstance(names, Mapping) and names and not names.keys() & default["materials"].keys():
+        allowed = f"a look of the scene {quote(scene.name)}, which has none of its materials"
+        raise ParameterError(label, min(map(str, names)), allowed)
+    return validate(document, default)

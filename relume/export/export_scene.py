@@ -1,0 +1,51 @@
+"""Export of a scene with a look to a file, whose suffix is its format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from relume.core.errors import ParameterError
+from relume.export.export_document import ExportDocument
+from relume.export.export_report import ExportReport, make_report
+from relume.export.write_glb import omitted_from_glb, write_glb
+from relume.export.write_materialx import omitted_from_materialx, write_materialx
+from relume.export.write_usd import omitted_from_usd, write_usd
+
+
+class ExportFormat(NamedTuple):
+    """A file format.
+
+    Attributes:
+        suffix: of its files. label, media_type: shown to users, and sent with downloads.
+        omitted: returns sentences about what a file does not have. write: writes it, atomically.
+    """
+
+    suffix: str
+    label: str
+    media_type: str
+    omitted: Callable[[ExportDocument], tuple[str, ...]]
+    write: Callable[[ExportDocument, Path], None]
+
+
+FORMATS = {
+    "glb": ExportFormat(".glb", "glTF", "model/gltf-binary", omitted_from_glb, write_glb),
+    "materialx": ExportFormat(".zip", "MaterialX", "application/zip", omitted_from_materialx, write_materialx),
+    "usd": ExportFormat(".usdz", "USD", "model/vnd.usdz+zip", omitted_from_usd, write_usd),
+}
+
+
+def format_of(path: Path) -> ExportFormat:
+    """Return the format of a file name. Raises ParameterError."""
+    name = path.name.lower()
+    for each in FORMATS.values():
+        if name.endswith(each.suffix):
+            return each
+    suffixes = ", ".join(each.suffix for each in FORMATS.values())
+    raise ParameterError("the export format", path.suffix, f"a file name ending in {suffixes}")
+
+
+def export_report(export: ExportDocument, file_format: ExportFormat) -> ExportReport:
+    """Return the errors of an export, and what its file will not have."""
+    return make_report(export, file_format.omitted(export))

@@ -1,0 +1,35 @@
+"""Coordinate frames of lights that emit along their −Z, as in glTF and USD."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.lights.local_lights import rectangle
+from relume.look.model import LightLook, RectangleLook
+from relume.raytrace.tangents import any_tangent
+
+F64 = NDArray[np.float64]
+
+
+def light_frame(light: LightLook) -> Shaped[F64, "4 4"]:
+    """Return the transform to world of a light other than an emissive mesh, rigid."""
+    position = getattr(light, "position", (0.0, 0.0, 0.0))
+    if isinstance(light, RectangleLook):
+        across, up = rectangle(light.geometry)[1]
+        return _frame(-across / np.linalg.norm(across), up / np.linalg.norm(up), position)
+    backward = -np.array(getattr(light, "direction", (0.0, 0.0, -1.0)), np.float64)
+    backward /= np.linalg.norm(backward)
+    right = any_tangent(backward[None].astype(np.float32))[0].astype(np.float64)
+    right -= (right @ backward) * backward
+    right /= np.linalg.norm(right)
+    return _frame(right, np.cross(backward, right), position)
+
+
+def _frame(right: F64, up: F64, position: Sequence[float]) -> Shaped[F64, "4 4"]:
+    frame = np.eye(4)
+    frame[:3] = np.column_stack([right, up, np.cross(right, up), position])
+    return frame
