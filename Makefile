@@ -82,7 +82,7 @@ audit: $(AUDIT_TOOLS)/bin/pip-audit  ## known holes in the packages that the loc
 	cd client_web && npm audit
 
 lock: $(LOCK_TOOLS)/bin/uv  ## choose package versions again
-	@printf '$(BUILD_NEEDS)' | $(UV) --extra dev $(OPTIONAL) pyproject.toml - -o requirements.lock
+	@printf '$(BUILD_NEEDS)' | $(UV) --extra dev --extra notebook $(OPTIONAL) pyproject.toml - -o requirements.lock
 	@printf '$(BUILD_NEEDS)' | $(UV) --constraint requirements.lock $(OPTIONAL) pyproject.toml - -o docker/requirements.lock
 
 clean:  ## remove what make made; data and bakes stay

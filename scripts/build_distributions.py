@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 import hatchling.build
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = {"relume", "relume_server", "relume_worker", "relume_cli", "relume_bench"}
+PACKAGES = {"relume", "relume_server", "relume_worker", "relume_cli", "relume_client", "relume_bench"}
 EDITOR = "relume_server/editor"
 REQUIRED = (
     f"{EDITOR}/index.html",

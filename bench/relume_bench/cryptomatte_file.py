@@ -60,8 +60,9 @@ def read_coverage(path: Path, layer: str) -> dict[str, Shaped[F64, "height width
     """Decode the coverage of each name in a layer's manifest."""
     buffer = OpenImageIO.ImageBuf(str(path))
     spec = buffer.spec()
-    values = dict(zip(spec.channelnames, np.moveaxis(buffer.get_pixels(OpenImageIO.FLOAT), 2, 0), strict=True))
-    attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+    pixels = np.asarray(buffer.get_pixels(OpenImageIO.FLOAT))
+    values = dict(zip(spec.channelnames, np.moveaxis(pixels, 2, 0), strict=True))
+    attributes = {attribute.name: str(attribute.value) for attribute in spec.extra_attribs}
     prefix = next(k.removesuffix("name") for k, v in attributes.items() if k.startswith("cryptomatte/") and v == layer)
     ranks = [
         (values[f"{layer}{k:02d}.{channel}"], values[f"{layer}{k:02d}.{alpha}"])

@@ -125,7 +125,7 @@ def _textures() -> Scene:
     share = Texture(_checker([[60], [180]]), encoding=TextureEncoding("share", (2.125, 2.125, 2.125)))
     normals = Texture(_checker([[128, 128, 255], [150, 120, 250]]), encoding=TextureEncoding("normal"))
     textures = {"diffuse": base, "roughness": share}
-    surface = PbrSurface(np.full(3, 0.8), _GRAY_F0, 1.0, 0.4, 0.043537, textures, True)
+    surface = PbrSurface(np.full(3, 0.8), _GRAY_F0, 1.0, 0.4, 0.043537, textures, has_normal_map=True)
     opacity = Opacity(_checker([255, 0]), cutoff=0.5)
     ball = Material("Tiles", make_terms(surface, CoatLayer()), textures, normals)
     return _scene("textures", ball, further=(Material("Lattice", make_terms(_PLASTIC, CoatLayer()), opacity=opacity),))
@@ -145,7 +145,7 @@ def _lights() -> Scene:
 
 def _checker(values: Any) -> U8:
     rows, columns = np.indices((_SIDE, _SIDE)) // 8
-    return np.asarray(values, np.uint8)[(rows + columns) % 2]
+    return np.asarray(np.asarray(values, np.uint8)[(rows + columns) % 2])
 
 
 SCENES: dict[str, Callable[[], Scene]] = {

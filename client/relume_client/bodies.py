@@ -278,6 +278,7 @@ class ImportOptions(TypedDict):
     recenter: NotRequired[Literal["auto", "always", "never"]]
     light_unit: NotRequired[Literal["file", "W/sr", "W"]]
     scene_name: NotRequired[str]
+    time: NotRequired[float | None]
 
 
 class InspectAnswer(TypedDict):
@@ -512,6 +513,7 @@ class RenderOptions(TypedDict):
     size: NotRequired[Sequence[int] | None]
     name: NotRequired[str | None]
     layers: NotRequired[bool | Literal["light_groups"]]
+    aovs: NotRequired[bool]
     precision: NotRequired[Literal["half", "float"]]
     color_space: NotRequired[str | None]
     fps: NotRequired[int]

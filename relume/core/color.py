@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
+Floats = TypeVar("Floats", NDArray[np.float32], NDArray[np.float64])
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Y of linear Rec. 709 red, green and blue (ITU-R BT.709-6)."""
 
@@ -31,6 +34,6 @@ def srgb_encode(linear: F32) -> F32:
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055).astype(linear.dtype)
 
 
-def srgb_decode(display: F32) -> F32:
+def srgb_decode(display: Floats) -> Floats:
     """Decode sRGB display values to linear values, the inverse of `srgb_encode`."""
     return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(display.dtype)

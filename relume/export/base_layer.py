@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -213,5 +214,5 @@ def normal_reflectance(ior: float) -> float:
 
 def index_of_refraction(reflectance: float) -> float:
     """Index of refraction of a reflectance at normal incidence."""
-    root = reflectance**0.5
+    root = sqrt(reflectance)
     return round((1 + root) / (1 - root), 6)

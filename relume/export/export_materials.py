@@ -140,7 +140,7 @@ class MaterialExporter:
             return ImageInput(file, factor=(encoding.scale[0],) * 3, wrap=texture.wrap)
 
         def make_pixels() -> NDArray[np.uint8]:
-            return np.rint(127.5 * (decode(texture.pixels, encoding) + 1)).astype(np.uint8)
+            return np.asarray(np.rint(127.5 * (decode(texture.pixels, encoding) + 1)), np.uint8)
 
         file = self._images.add(f"{material.name} normals", ("normals", id(texture)), make_pixels)
         return ImageInput(file, wrap=texture.wrap)
@@ -255,7 +255,7 @@ def _omitted(material: Material, look: MaterialLook, *, is_projected: bool) -> t
     sentences = {
         f"The {label} is exported as a surface, not as a shadow catcher.": look.shadow_catcher,
         f"Images on {label} need UV coordinates, which its objects lack.": is_projected,
-        f"The BTF of {label} is exported as its mean.": any(term["model"] == "btf" for term in look.terms),
+        f"The BTF of {label} is exported as its mean.": any(term["model"] == "measured_btf" for term in look.terms),
         f"Transmitted and reflected light of {label} have one roughness.": _differs(glass_roughness, look),
     }
     return tuple(sentence for sentence, applies in sentences.items() if applies)
@@ -263,5 +263,5 @@ def _omitted(material: Material, look: MaterialLook, *, is_projected: bool) -> t
 
 def _differs(glass_roughness: float | None, look: MaterialLook) -> bool:
     """True if no highlight has the roughness of the glass."""
-    values = [term["params"].get("roughness") for term in look.terms if term["model"] == "ggx"]
-    return glass_roughness is not None and bool(values) and abs(float(np.mean(values[0])) - glass_roughness) > 0.01
+    values = [np.mean(term["params"].get("roughness", 0.0)) for term in look.terms if term["model"] == "ggx"]
+    return glass_roughness is not None and bool(values) and abs(float(values[0]) - glass_roughness) > 0.01

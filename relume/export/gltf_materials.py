@@ -147,4 +147,5 @@ def _volume(surface: SurfaceParameters) -> dict[str, Any]:
 
 def _factors(value: Scalar | Color) -> list[float]:
     """Three factors of a number, a color or an image."""
-    return np.broadcast_to(value.factor if isinstance(value, ImageInput) else value, 3).tolist()
+    red, green, blue = np.broadcast_to(value.factor if isinstance(value, ImageInput) else value, 3).tolist()
+    return [red, green, blue]

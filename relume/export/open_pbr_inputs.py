@@ -96,7 +96,10 @@ def _transmission(surface: SurfaceParameters) -> Inputs:
         inputs["geometry_thin_walled"] = 1.0
     if not isfinite(surface.attenuation_distance):
         return inputs | {"transmission_color": surface.base_color}
-    depth = {"transmission_depth": surface.attenuation_distance, "transmission_color": surface.attenuation_color}
+    depth: Inputs = {
+        "transmission_depth": surface.attenuation_distance,
+        "transmission_color": surface.attenuation_color,
+    }
     return inputs | depth
 
 

@@ -148,8 +148,9 @@ def _fitted(target: Shaped[F64, "n 3"], coat: CoatLayer, pairs: DirectionPairs) 
         columns = np.stack(lobes(*widths, pairs), axis=1) * (below * pairs.weight)[:, None]
         surface = _bounded_solution(columns, rest, roughness)
         difference = columns @ np.stack([surface.diffuse, surface.f0, np.full(3, surface.f90)]) - rest
-        error = np.linalg.norm(difference) / max(np.linalg.norm(target * pairs.weight[:, None]), 1e-30)
-        return PrincipledFit(surface, replace(coat, anisotropy=anisotropy), float(error), turn)
+        norm = float(np.linalg.norm(target * pairs.weight[:, None]))
+        error = float(np.linalg.norm(difference)) / max(norm, 1e-30)
+        return PrincipledFit(surface, replace(coat, anisotropy=anisotropy), error, turn)
 
     turns = [(0.0, 0.0)]
     if pairs is not direction_pairs(is_isotropic=True):

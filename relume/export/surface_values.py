@@ -2,8 +2,8 @@
 
     f = A (D/π + G F) + sheen + coat,   G = D_GGX V,   F = f0 (1 − k) + f90 k,   k = (1 − cos θd)⁵
 
-with the anisotropic GGX of KHR_materials_anisotropy and the attenuation A of `relume.scene_io.surfaces.to_terms`. The pairs
-are dense in half vectors near the normal: wi mirrors wo about h, dωi = 4 (wo·h) dωh. Errors weight f² by
+with the anisotropic GGX of KHR_materials_anisotropy and the attenuation A of `relume.scene_io.surfaces.to_terms`. The
+pairs are dense in half vectors near the normal: wi mirrors wo about h, dωi = 4 (wo·h) dωh. Errors weight f² by
 cos² θi cos θo.
 """
 

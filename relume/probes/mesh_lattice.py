@@ -213,7 +213,7 @@ def _find_spacing(grids: _Grids, finest: float, num_probes: int) -> tuple[float,
     num_spacings = math.ceil(_SPACINGS_PER_OCTAVE * max(math.log2(grids.coarsest_spacing / finest), 0))
 
     def spacing_of(index: int) -> float:
-        return finest * 2.0 ** (index / _SPACINGS_PER_OCTAVE)
+        return finest * math.exp2(index / _SPACINGS_PER_OCTAVE)
 
     def fits(index: int, normal_steps: int) -> bool:
         if grids.num_nodes(spacing_of(index)) > node_limit:

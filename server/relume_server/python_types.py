@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic.json_schema import models_json_schema
 
@@ -66,7 +66,8 @@ def _components() -> Mapping[str, Schema]:
 def _messages() -> dict[str, Schema]:
     """Schemas of what a session sends, with all that they refer to."""
     models = (*SERVER_MESSAGES, protocol.FrameHeader)
-    _, schema = models_json_schema([(model, "serialization") for model in models], by_alias=True)
+    modes: list[tuple[Any, Literal["serialization"]]] = [(model, "serialization") for model in models]
+    _, schema = models_json_schema(modes, by_alias=True)
     return {name: {**body, "required": list(body.get("properties", {}))} for name, body in schema["$defs"].items()}
 
 

@@ -55,7 +55,9 @@ def sample_scene() -> Scene:
     roughness = Texture(checker([[51], [153]]), ("mirror", "clamp"), TextureEncoding("share", (2.5, 2.5, 2.5)))
     normals = Texture(checker([[128, 128, 255], [150, 128, 250]]), encoding=TextureEncoding("normal", (0.5, 0.5, 1.0)))
     textures = {"diffuse": srgb_texture(checker([[255, 0, 0], [0, 200, 40]])), "roughness": roughness}
-    textured = PbrSurface(PLASTIC.diffuse, PLASTIC.f0, 1.0, 0.4, PLASTIC.specular_reflectance, textures, True)
+    textured = PbrSurface(
+        PLASTIC.diffuse, PLASTIC.f0, 1.0, 0.4, PLASTIC.specular_reflectance, textures, has_normal_map=True
+    )
     glass = Glass((0.9, 0.8, 0.7), 1.3, 0.01, (1.0, 2.0, 4.0), 0.2)
     glass_surface = PbrSurface(np.zeros(3), np.full(3, (0.3 / 2.3) ** 2), 1.0, 0.2)
     return scene_of(
