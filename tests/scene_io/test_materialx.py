@@ -548,8 +548,8 @@ def test_images_of_radiance_and_edges_that_are_extended(tmp_path: Path) -> None:
     np.testing.assert_allclose(texels(texture)[0, 0], [0.25, 0.5, 1], atol=4e-3)
     assert texture.wrap == ("clamp", "repeat")
     assert warnings == [
-        "An image of material “M” is black outside its bounds in the file; its edge is extended.",
         "Values of “c.exr” above 1 are clamped in textures.",
+        "An image of material “M” is black outside its bounds in the file, which isn't supported.",
     ]
 
 

@@ -126,7 +126,7 @@ def test_scale_and_bias_of_colors_apply_to_linear_values() -> None:
     [
         ("(2, 2, 2, 1)", "(-1, -1, -1, 0)", [0.6, -0.2, 0.77]),
         ("(2, -2, 2, 1)", "(-1, 1, -1, 0)", [0.6, 0.2, 0.77]),
-        ("(1, 1, 1, 1)", "(0, 0, 0, 0)", [0.8, 0.4, 0.885]),
+        ("(1, 1, 2, 1)", "(0, 0, -1, 0)", [0.8, 0.4, 0.77]),
     ],
 )
 def test_normals_are_the_bytes_times_scale_plus_bias(scale: str, bias: str, expected: list[float]) -> None:
@@ -433,20 +433,37 @@ def test_depths_of_transmission_are_in_the_unit_of_the_stage() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrap", "expected", "is_extended"),
-    [("", "clamp", True), ("useMetadata", "clamp", True), ("black", "clamp", True), ("clamp", "clamp", False),
+    ("wrap", "expected", "is_black"),
+    [("", "repeat", True), ("useMetadata", "repeat", True), ("black", "clamp", True), ("clamp", "clamp", False),
      ("repeat", "repeat", False), ("mirror", "mirror", False)],
 )  # fmt: skip
-def test_wrap_modes(wrap: str, expected: str, *, is_extended: bool) -> None:
-    """Without metadata of the image, `useMetadata` is black outside, and so is the default."""
+def test_wrap_modes(wrap: str, expected: str, *, is_black: bool) -> None:
+    """Without metadata of the image, `useMetadata` is black outside, and so is the default; said where it is seen."""
     node = texture("Image", "c.png").replace(
         'token inputs:wrapS = "repeat"', f'token inputs:wrapS = "{wrap}"' * bool(wrap)
     )
-    scene = imported(usda(painted(RGB, node)), Files({"c.png": CHECKER}))
-    assert scene.materials[0].textures["diffuse"].wrap == (expected, "repeat")
-    sentence = "An image of material “Paint” is black outside its bounds in the file; its edge is extended."
-    assert list(scene.warnings) == [sentence] * is_extended
-    assert all(warning.severity == "approximated" for warning in scene.warnings)
+    larger_st = ST.replace("(1, 0), (1, 1)", "(2, 0), (2, 1)")
+    assert larger_st != ST
+    for st, is_seen in ((ST, False), (larger_st, True)):
+        scene = imported(usda(painted(RGB, node, st)), Files({"c.png": CHECKER}))
+        assert scene.materials[0].textures["diffuse"].wrap == (expected, "repeat")
+        sentence = "An image of material “Paint” is black outside its bounds in the file, which isn't supported."
+        assert list(scene.warnings) == [sentence] * (is_black and is_seen)
+
+
+def test_normals_without_their_scale_are_read_as_a_normal_map() -> None:
+    """The values of texels are never vectors that all point to one side; exporters forget scale and bias."""
+    connect = "normal3f inputs:normal.connect = </Paint/Image.outputs:rgb>"
+    files = Files({"n.png": png([[[128, 128, 255], [160, 128, 250]]])})
+    scaled = "float4 inputs:scale = (2, 2, 2, 1)\nfloat4 inputs:bias = (-1, -1, -1, 0)"
+    exact, sloppy = (imported(usda(painted(connect, texture("Image", "n.png", more))), files) for more in (scaled, ""))
+    assert exact.warnings == ()
+    assert any("lacks the scale of normals" in warning for warning in sloppy.warnings)
+    first, second = exact.materials[0].normal_map, sloppy.materials[0].normal_map
+    assert first is not None
+    assert second is not None
+    np.testing.assert_array_equal(first.pixels, second.pixels)
+    assert first.encoding == second.encoding
 
 
 def test_the_specular_workflow_is_no_unusual_index_of_refraction() -> None:
@@ -480,3 +497,9 @@ def test_display_colors_are_scaled_by_the_weight_of_the_base() -> None:
     colors = np.array(scene.materials[0].terms[0]["color"]) / DIELECTRIC_TRANSMISSION
     np.testing.assert_allclose(colors, [0, 0.25, 0.5], atol=1e-4)
     assert scene.warnings == ()
+
+
+def test_values_above_1_of_scaled_colors_are_a_warning() -> None:
+    node = texture("Image", "c.png", "float4 inputs:scale = (2, 2, 2, 1)")
+    scene = imported(usda(painted(RGB, node)), Files({"c.png": CHECKER}))
+    assert "Values above 1 of the base color texture of material “Paint” are clamped." in scene.warnings

@@ -18,7 +18,7 @@ from relume.scene_io.obj_ply.material_maker import printable, read_companion
 from relume.scene_io.referenced_files import Companions
 from relume.scene_io.surfaces.image_nodes import IMAGE_NODES
 from relume.scene_io.surfaces.make_material import ReadMaterial, SurfaceMaterials
-from relume.scene_io.surfaces.models import MODELS, SurfaceReader
+from relume.scene_io.surfaces.models import MODELS, SurfaceReader, warn_black_outside
 from relume.scene_io.surfaces.node_values import NodeValues
 from relume.scene_io.surfaces.surface_images import SurfaceImages, first_tile
 
@@ -62,7 +62,10 @@ def import_materialx(data: bytes, companions: Companions) -> MaterialXDocument:
         if len(materials) == MAX_MATERIALS:
             raise MaterialError(f"the .mtlx file has more than {MAX_MATERIALS} materials; split it")
         ports = [(port.getName(), DocumentPort(port)) for port in shader.getInputs()]
-        materials.append(maker.make(name, reader.read(shader.getCategory(), ports, f"material {quote(name)}")))
+        label = f"material {quote(name)}"
+        surface = reader.read(shader.getCategory(), ports, label)
+        warn_black_outside(surface, label, warnings)
+        materials.append(maker.make(name, surface))
     maker.warn_occlusion_maps()
     if not materials:
         reasons = " ".join(warnings)

@@ -11,8 +11,8 @@ from relume.scene_io.surfaces.surface_inputs import Rgb, Value, scaled
 from relume.scene_io.surfaces.texture_coordinates import ONE, ZERO, Placement
 
 _WHITE = (1.0, 1.0, 1.0)
-_WRAPS = {"mirror": "mirror", "clamp": "clamp", "constant": "clamp", "black": "clamp", "useMetadata": "clamp"}
-_EXTENDED = ("constant", "black", "useMetadata")  # images have no metadata about it, and are black outside then
+_WRAPS = {"mirror": "mirror", "clamp": "clamp", "constant": "clamp", "black": "clamp"}
+_BLACK = ("constant", "black", "useMetadata")  # images have no metadata about it, and are black outside then
 _UVS = ("texcoord", "geompropvalue", "UsdPrimvarReader")
 
 
@@ -114,8 +114,6 @@ def _read(
         raise UnsupportedNodeError(f"node {quote(node.name)} has no file")
     is_color = node.type.startswith("color") or node.category in ("gltf_colorimage", "UsdUVTexture")
     modes = [values.text(node, name, wrap) for name in wraps]
-    if any(mode in _EXTENDED for mode in modes):
-        values.warn_approximated("is black outside its bounds in the file; its edge is extended")
     transform = placement.uv_transform()
     if transform is None:
         values.warn(f"The texture coordinates of node {quote(node.name)} are sheared; they are used as they are.")
@@ -127,6 +125,7 @@ def _read(
         "r" if node.type == "float" else "rgb",
         values.is_srgb(port.color_space()) if is_color else False,
         wrap=(_WRAPS.get(modes[0], "repeat"), _WRAPS.get(modes[1], "repeat")),
+        is_black_outside=any(mode in _BLACK for mode in modes),
         uv_set=placement.uv_set,
         transform=transform,
         default=values.numbers(node, "default", (0.0, 0.0, 0.0)) if has_default else None,

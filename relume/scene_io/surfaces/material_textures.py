@@ -96,7 +96,20 @@ class MaterialTextures:
         self._textures = {
             key: texture for key, group in _groups(surface).items() if (texture := _packed(group)) is not None
         }
+        self._warn_clamped(surface)
         self.transforms = UvTransforms([texture.slot for texture in self._textures.values()], label, warnings)
+
+    def _warn_clamped(self, surface: SurfaceParameters) -> None:
+        """Warn about images that are brighter than 1 in the file, where textures cannot be."""
+        for group in _groups(surface).values():
+            images = [value for value in group.values.values() if isinstance(value, ImageInput)]
+            if (
+                np.isfinite(group.maximum)
+                and group.encoding != "normal"
+                and any(max(np.add(image.factor, image.bias)) > group.maximum for image in images)
+            ):
+                message = f"Values above {group.maximum:g} of the {group.name} texture of {self._label} are clamped."
+                self._warnings.append(approximated(message))
 
     def layout(self) -> TextureLayout | None:
         """Place and size of the textures; None without any."""

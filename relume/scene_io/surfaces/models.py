@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from relume.core.import_warnings import ImporterWarning, quote, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene_io.surfaces.gltf_pbr import gltf_pbr
 from relume.scene_io.surfaces.node_values import NodeValues, Port, PrimvarReference
 from relume.scene_io.surfaces.open_pbr import open_pbr
@@ -25,6 +25,23 @@ MESH_COLORS = "displayColor"  # primvar
 _BASE_COLORS = ("base_color", "diffuseColor")
 _TANGENTS = ("tangent", "geometry_tangent", "geometry_coat_tangent")
 _COAT_NORMALS = ("coat_normal", "geometry_coat_normal", "clearcoat_normal")
+
+
+def warn_black_outside(
+    surface: SurfaceParameters,
+    label: str,
+    warnings: list[ImporterWarning],
+    leaves_bounds: Callable[[ImageInput], bool] = lambda image: True,
+) -> None:
+    """Warn once if an image is seen where the file has black.
+
+    Args:
+        surface: a surface. label: names the material. warnings: gets the sentence.
+        leaves_bounds: True for images that some surfaces use outside [0, 1]; by default for all.
+    """
+    if any(map(leaves_bounds, surface.black_outside())):
+        message = f"An image of {label} is black outside its bounds in the file, which isn't supported."
+        warnings.append(approximated(message))
 
 
 class SurfaceReader:

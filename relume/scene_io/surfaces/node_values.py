@@ -6,15 +6,15 @@ Everything else raises `UnsupportedNodeError`, and the input of the surface has 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from relume.core.color import srgb_decode
-from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
+from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_inputs import Rgb, Value, channel, scaled
+from relume.scene_io.surfaces.surface_inputs import Rgb, Value, channel, encoded_normals, scaled
 from relume.scene_io.surfaces.texture_coordinates import Pair
 
 MAX_STEPS = 20_000  # nodes that the inputs of one document visit, and of each of its surfaces
@@ -95,7 +95,7 @@ class NodeValues:
 
     def __init__(self, image_nodes: Mapping[str, ImageNode], warnings: list[ImporterWarning]) -> None:
         self._image_nodes, self._warnings = image_nodes, warnings
-        self._remaining_steps, self._label = MAX_STEPS, ""
+        self._remaining_steps = MAX_STEPS
 
     def surface(self, ports: Iterable[tuple[str, Port]], label: str) -> dict[str, NodeValue]:
         """The values of a shader's inputs; those that cannot be read are left out, with a warning.
@@ -104,7 +104,6 @@ class NodeValues:
             ports: names and inputs. label: names the material in warnings.
         """
         self._remaining_steps += STEPS_PER_SURFACE
-        self._label = label
         results = dict[str, NodeValue]()
         for name, port in ports:
             try:
@@ -160,21 +159,14 @@ class NodeValues:
 
     def warn(self, sentence: str) -> None:
         """Add a warning about something that looks different from the document, once."""
-        self._add(unsupported(sentence))
-
-    def warn_approximated(self, effect: str) -> None:
-        """Add a warning about an image of the surface, once; `effect` follows its name."""
-        self._add(approximated(f"An image of {self._label} {effect}."))
+        if sentence not in self._warnings:
+            self._warnings.append(unsupported(sentence))
 
     def is_srgb(self, space: str) -> bool | None:
         """True if a color space is sRGB; None if the image decides. Others than linear Rec. 709 are a warning."""
         if space not in (*SRGB, *LINEAR, AUTO):
             self.warn(f"The color space {quote(space)} isn't supported; it is read as linear Rec. 709.")
         return None if space == AUTO else space in SRGB
-
-    def _add(self, warning: ImporterWarning) -> None:
-        if warning not in self._warnings:
-            self._warnings.append(warning)
 
     def _optional(self, node: ShaderNode, name: str) -> NodeValue | None:
         port = node.port(name)
@@ -224,16 +216,8 @@ NODES = (
 
 
 def normal_vector(value: Value, scale: Rgb) -> Value:
-    """A normal as a vector, of an image whose texels are (n + 1) / 2.
-
-    Args:
-        value: the image. scale: of x and y.
-    """
-    if not isinstance(value, ImageInput):
-        return value
-    strength = np.array([scale[0], scale[1], 1.0])
-    (x, y, z), (u, v, w) = (strength * 2 * value.factor).tolist(), (strength * (2 * np.array(value.bias) - 1)).tolist()
-    return replace(value, factor=(x, y, z), bias=(u, v, w), is_srgb=False, default=None)
+    """A normal as a vector, see `encoded_normals`; constants are vectors already."""
+    return encoded_normals(value, scale) if isinstance(value, ImageInput) else value
 
 
 def _product(a: Value, b: Value) -> Value:

@@ -38,7 +38,7 @@ class ImageInput:
         channel: "r", "g", "b" or "a" of a number; "rgb" of a color or a vector.
         is_srgb: colors are in sRGB, otherwise linear; None if their use decides, sRGB for colors. Alpha is linear.
         factor, bias: of the values; of a number, three equal ones.
-        wrap: as in `relume.scene.model.Texture`.
+        wrap: as in `relume.scene.model.Texture`. is_black_outside: the file is black outside its bounds instead.
         uv_set: set of UV coordinates. transform: of these with v from the top, as in glTF.
         default: value if the file is missing; None for the default of the surface's input.
     """
@@ -49,6 +49,7 @@ class ImageInput:
     factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
     bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
     wrap: tuple[str, str] = ("repeat", "repeat")
+    is_black_outside: bool = False
     uv_set: UvSet = "st"
     transform: UvTransform = field(default_factory=UvTransform)
     default: tuple[float, float, float] | None = None

@@ -72,8 +72,13 @@ class SurfaceInputs:
     def normal(self, name: str) -> ImageInput | None:
         """A normal map, whose values are vectors; None without one."""
         value = self._values.get(name)
-        if not isinstance(value, ImageInput) or self._images.pixels(value.file, self._describe(name)) is None:
+        pixels = self._images.pixels(value.file, self._describe(name)) if isinstance(value, ImageInput) else None
+        if not isinstance(value, ImageInput) or pixels is None:
             return None
+        if pixels.dtype == np.uint8 and value.factor == _ONE and value.bias == (0.0, 0.0, 0.0):
+            # bytes as vectors would all lean to one side: exporters forget the scale
+            self.warn_approximated(f"{name} of {self.label} lacks the scale of normals; it is read as (n + 1) / 2.")
+            value = encoded_normals(value, _ONE)
         return replace(value, is_srgb=bool(value.is_srgb))
 
     def mean(self, name: str, value: Value) -> Rgb:
@@ -120,6 +125,17 @@ class SurfaceInputs:
 
     def _describe(self, name: str) -> str:
         return f"image of {name} of {self.label}"
+
+
+def encoded_normals(image: ImageInput, scale: Rgb) -> ImageInput:
+    """Normals as vectors, of an image whose texels are (n + 1) / 2.
+
+    Args:
+        image: the image. scale: of x and y.
+    """
+    strength = np.array([scale[0], scale[1], 1.0])
+    (x, y, z), (u, v, w) = (strength * 2 * image.factor).tolist(), (strength * (2 * np.array(image.bias) - 1)).tolist()
+    return replace(image, factor=(x, y, z), bias=(u, v, w), is_srgb=False, default=None)
 
 
 def channel(value: Value, name: str) -> Value:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import inf, sqrt
 
 from relume.scene_io.surfaces.surface_images import ImageInput
@@ -75,6 +75,11 @@ class SurfaceParameters:
     alpha_cutoff: float = 0.5
     normal: ImageInput | None = None
     has_occlusion: bool = False
+
+    def black_outside(self) -> list[ImageInput]:
+        """Images that are black outside their bounds in the file, where they repeat or extend their edge instead."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return [value for value in values if isinstance(value, ImageInput) and value.is_black_outside]
 
 
 def from_microfacet_widths(along: float, across: float) -> tuple[float, float]:

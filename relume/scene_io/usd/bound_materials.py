@@ -15,13 +15,16 @@ from relume.scene.model import F32
 from relume.scene.textured_vertex_colors import TexturedColors
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.surfaces.make_material import NO_COLORS, ReadMaterial, SurfaceMaterials, VertexColors
-from relume.scene_io.surfaces.surface_images import SurfaceImages
+from relume.scene_io.surfaces.models import warn_black_outside
+from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+from relume.scene_io.surfaces.uv_transforms import UvSlot
 from relume.scene_io.usd.networks import UsdSurfaceReader
 from relume.scene_io.usd.polygon_mesh import COLOR, OPACITY, PrimTriangles, Primvar
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
+_UV_TOLERANCE = 1e-3
 GRAY = (0.5, 0.5, 0.5, 1.0)  # of prims without material and color
 UNBOUND = SurfaceParameters(has_mesh_colors=True, roughness=0.5, alpha_mode="BLEND")
 
@@ -92,10 +95,12 @@ class UsdMaterialReader:
             name, surface: from `surface`. shapes: all triangles that have it. thickness: of the solids that it bounds,
                 meters. double_sided: whether a prim shows both sides.
         """
+        label = f"material {quote(name)}"
+        warn_black_outside(surface, label, self._warnings, lambda image: _leaves_bounds(image, shapes))
         colors, color_uvs = NO_COLORS, dict[int, F32]()
         if surface.has_mesh_colors:
             has_textures = self._maker.texture_layout(name, surface) is not None
-            colors, color_uvs = self._colors(shapes, f"material {quote(name)}", has_textures=has_textures)
+            colors, color_uvs = self._colors(shapes, label, has_textures=has_textures)
         if surface.thickness > 0:
             surface = replace(surface, thickness=thickness)
         read_material = self._maker.make(name, surface, colors, double_sided=double_sided)
@@ -143,6 +148,20 @@ def bound_material(prim: Any, warnings: list[ImporterWarning]) -> str:
         message = f"Material {quote(path.name)} of {quote(prim.GetName())} is missing; it has its display color."
         warnings.append(unsupported(message))
     return ""
+
+
+def _leaves_bounds(image: ImageInput, shapes: Sequence[PrimTriangles]) -> bool:
+    """True if texture coordinates of an image are outside [0, 1], or unknown."""
+    slot = UvSlot(image.uv_set, image.transform)
+    for shape in shapes:
+        primvar = shape.primvars.get(str(image.uv_set))
+        if primvar is None:
+            return True
+        upward = primvar.values[np.unique(primvar.index[primvar.index >= 0])]
+        uv = slot.apply({image.uv_set: (upward * (1, -1) + (0, 1)).astype(np.float32)}, len(upward))
+        if len(uv) and (uv.min() < -_UV_TOLERANCE or uv.max() > 1 + _UV_TOLERANCE):
+            return True
+    return False
 
 
 def display_colors(shape: PrimTriangles) -> Shaped[F32, "triangles 3 4"]:
