@@ -54,6 +54,8 @@ export function StartPage() {
   };
   const onReplaced = ({ number, known }: BakeDialogState, scene: SceneBody, replaced: string) => {
     setDialog((current) => (current?.number === number ? { ...current, scene } : current));
+    // at once, since the card of the replaced scene would open nothing; the list follows
+    setScenes((current) => current?.map((each) => (each.id === replaced ? scene : each)) ?? null);
     void reportErrors(() => (scene.id === replaced ? Promise.resolve() : disposeReplaced(replaced, known))).then(
       refresh,
     );

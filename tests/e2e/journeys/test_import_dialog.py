@@ -97,7 +97,7 @@ def test_options_turn_and_scale_the_scene_in_the_dialog(start: Page, server: Ser
 
 def test_the_time_of_an_animation_is_a_number_that_can_be_taken_back(start: Page, server: Server, pillar: Path) -> None:
     dialog = import_pillar(start, pillar)
-    time, status = dialog.get_by_label("Time"), dialog.get_by_role("status").first
+    time, status = dialog.get_by_role("spinbutton", name="Time"), dialog.get_by_role("status").first
     time.fill("1.5")
     time.press("Enter")
     expect(status).to_have_text("Imported with Time 1.5.")

@@ -30,6 +30,7 @@ def test_editor_works_below_a_prefix(server: Server, browser: Browser, tmp_path:
         before = editor.pixels()
         editor.choose("Ball", 1)
         editor.drag(editor.slider("Roughness σ"), 0.3, 0.8)
+        editor.wait_until_exact()
         assert changed(before, editor.pixels()) > 0.01
         page.evaluate(REFUSE_COPY)
         page.get_by_role("button", name="Share: copy a link to this look").click()
