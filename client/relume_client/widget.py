@@ -105,7 +105,8 @@ class LookWidget(anywidget.AnyWidget):  # type: ignore[misc]
 
     def close(self) -> None:
         """Leave the session, and remove the widget."""
-        self._session.close()
+        if "_session" in self.__dict__:  # a widget that could not be made is closed as it is deleted
+            self._session.close()
         super().close()
 
     def _on_frame(self, frame: Frame | None) -> None:

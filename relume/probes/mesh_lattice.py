@@ -256,7 +256,11 @@ def _make_grids(
 def positions_in_faces(
     geometry: SceneBuffers, face: Shaped[NDArray[np.integer], " n"], u: Shaped[F64, " n"], v: Shaped[F64, " n"]
 ) -> Shaped[F64, "n 3"]:
-    """Points on faces, meters. u, v: barycentric, of the second and third corner."""
+    """Points on faces, meters.
+
+    Args:
+        geometry: the triangles. face: of each point. u, v: barycentric, of the second and third corner.
+    """
     a, b, c = geometry.positions[geometry.faces[face]].astype(np.float64).transpose(1, 0, 2)
     return np.asarray((1 - u - v)[:, None] * a + u[:, None] * b + v[:, None] * c)
 

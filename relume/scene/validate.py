@@ -14,7 +14,7 @@ MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
 MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
 MAX_IOR = 4.0
-# of lights, in a scene and in a look: a lamp of 1000 W is as bright in a scene of 100 km as one of 0.1 W in a room
+# of lights, in a scene and in a look: 1000 W are as bright in a scene of 100 km as 0.1 W in a room
 MAX_EMISSION, MAX_METERS = 1e12, 1e9
 
 

@@ -7,7 +7,7 @@ import io
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from coroutines import run_in_thread
 from PIL import Image
-from running_server import Running
+from running_server import Running, running_server
 from server_fakes import SIZE, Control
 
 from relume.image_io.tone_mapping import tone_map
@@ -32,6 +32,7 @@ from relume_client import (
 )
 from relume_client.transport import Transport, normalize_url
 from relume_server.io.import_request import _import
+from relume_server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
 TRIANGLE = b"mtllib colors/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Red\nf 1 2 3\n"
@@ -144,7 +145,14 @@ def test_server_that_is_away() -> None:
         client.scenes()
 
 
-def test_refused_token(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def guarded(settings: Settings, control: Control) -> Iterator[Running]:
+    with running_server(settings.model_copy(update={"login": True}), control) as running:
+        yield running
+
+
+def test_refused_token(guarded: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    running = guarded
     monkeypatch.setattr("relume_server.auth.tokens.TOKEN_CACHE_S", 0.0)
     tokens = running.app.state.services.access.tokens
     token, bake = tokens.add("Ann", "edit"), running.bake()

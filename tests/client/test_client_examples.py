@@ -90,7 +90,9 @@ def test_compared_looks(run: Run, tmp_path: Path) -> None:
     made = run("05_compare_looks.py", *SIZE, "--out", tmp_path / "both.png")
     assert np.array(Image.open(tmp_path / "both.png")).shape == (HEIGHT, 2 * WIDTH, 3)
     assert made["first"].dtype == np.float32
-    assert 0.01 < made["difference"] < 1
+    squares = [np.sum(each.astype(np.float64) ** 2) for each in (made["second"] - made["first"], made["first"])]
+    assert made["difference"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-4)
+    assert made["difference"] > 0.01
     changed = np.any(made["first"] != made["second"], axis=-1)
     assert 0 < changed.mean() < 1
     assert not np.any(np.any(made["first_shown"] != made["second_shown"], axis=-1) & ~changed)

@@ -444,11 +444,11 @@ def test_wrap_modes(wrap: str, expected: str, *, is_black: bool) -> None:
     )
     larger_st = ST.replace("(1, 0), (1, 1)", "(2, 0), (2, 1)")
     assert larger_st != ST
-    for st, is_seen in ((ST, False), (larger_st, True)):
+    for st, is_outside in ((ST, False), (larger_st, True)):
         scene = imported(usda(painted(RGB, node, st)), Files({"c.png": CHECKER}))
         assert scene.materials[0].textures["diffuse"].wrap == (expected, "repeat")
         sentence = "An image of material “Paint” is black outside its bounds in the file, which isn't supported."
-        assert list(scene.warnings) == [sentence] * (is_black and is_seen)
+        assert list(scene.warnings) == [sentence] * (is_black and is_outside)
 
 
 def test_normals_without_their_scale_are_read_as_a_normal_map() -> None:

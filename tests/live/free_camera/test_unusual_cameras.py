@@ -79,7 +79,7 @@ def plane(tmp_path_factory, unmeasured):
 
 
 def floor_corners(camera):
-    """How many corners of each pixel show the floor, from 0 to 4."""
+    """Number of corners of each pixel that show the floor, from 0 to 4."""
     y, x = np.indices(SIZE[::-1]).reshape(2, -1).astype(np.float32)
     origin, count = camera.to_world[:3, 3], np.zeros(len(x), int)
     for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
