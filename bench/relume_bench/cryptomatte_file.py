@@ -53,7 +53,7 @@ def measure(tiny: bool) -> list[Figure]:
         "mean_difference_from_finer_rays": float(np.abs(sampling).mean()),
         "largest_difference_from_finer_rays": float(np.abs(sampling).max()),
     }
-    return [Figure("export.cryptomatte_error", float(max(errors)), "", context)]
+    return [Figure("export.cryptomatte_error", 100 * float(max(errors)), "%", context)]
 
 
 def read_coverage(path: Path, layer: str) -> dict[str, Shaped[F64, "height width"]]:

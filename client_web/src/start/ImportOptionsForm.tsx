@@ -17,11 +17,13 @@ export function ImportOptionsForm({ options, onChange }: ImportOptionsFormProps)
       const { value } = event.currentTarget;
       onChange({ ...options, [key]: key !== "time" ? value : value === "" ? null : Number(value) });
     };
-    const common = { id: `${form}-${key}`, value: options[key] ?? "", onChange: change };
-    if (key === "time") return <input {...common} type="number" step="any" placeholder="Rest pose" />;
-    if (choices.length === 0) return <input {...common} maxLength={MAX_TEXT} placeholder="As in file" />;
+    const [id, value] = [`${form}-${key}`, options[key] ?? ""];
+    // another drawing of the dialog must not take back what is being typed
+    const typed = { id, key: value, defaultValue: value, onChange: change };
+    if (key === "time") return <input {...typed} type="number" step="any" placeholder="Rest pose" />;
+    if (choices.length === 0) return <input {...typed} maxLength={MAX_TEXT} placeholder="As in file" />;
     return (
-      <select {...common}>
+      <select id={id} value={value} onChange={change}>
         {choices.map(({ value, label }) => (
           <option key={value} value={value ?? ""}>
             {label}
