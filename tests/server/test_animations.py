@@ -138,7 +138,7 @@ def test_camera_path_interpolates_cameras_and_looks(
         {"path": {"turntable": 3}, "frames": 4},
         {"path": {"turntable": 3, "rotate": "moon"}},
         {"path": {"turntable": 3, "pivot": [0, 0]}},
-        {"path": {"turntable": 3, "pivot": [0, 0, 1e9]}},
+        {"path": {"turntable": 3, "pivot": [0, 0, 1e10]}},
         {"path": {"cameras": [{"to_world": [0.0] * 16, "yfov": 40.0}]}},
         {"path": {"cameras": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
         {"frames": 0},

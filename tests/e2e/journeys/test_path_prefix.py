@@ -23,7 +23,7 @@ def test_editor_works_below_a_prefix(server: Server, browser: Browser, tmp_path:
 
         page.on("request", note)
         page.goto(url)
-        expect(page.get_by_text(scene["name"])).to_be_visible()
+        expect(page.get_by_text(scene["name"], exact=True)).to_be_visible()
         page.goto(f"{url}?scene={scene['id']}")
         editor = Editor(page)
         editor.wait_until_exact()
