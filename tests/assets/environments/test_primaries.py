@@ -36,12 +36,13 @@ def test_rec_709_primaries_change_nothing():
 
 
 def test_a_map_in_other_primaries_has_the_same_radiance(tmp_path):
-    """Written with the inverse matrix; texels that are not numbers are black."""
+    """Written with the inverse matrix; a texel that is no number is the mean of the eight around it."""
     expected = dusk()
     other = expected @ np.linalg.inv(np.array(OF_2020)).T
     other[3, 4] = np.nan
     actual = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
-    expected[3, 4] = 0
+    around = expected[2:5, 3:6].reshape(9, 3)
+    expected[3, 4] = np.delete(around, 4, axis=0).mean(axis=0)
     np.testing.assert_allclose(actual.radiance, expected, atol=2e-3 * expected.max(), rtol=2e-3)
     assert [warning.severity for warning in actual.warnings] == ["unsupported"]
     plain = read_environment(write_map(tmp_path / "b.exr", expected, REC_709), "dusk")
