@@ -58,6 +58,7 @@ TARGETS = {
     "render.two_workers_speedup": "≥ 1.7",
     "store.bytes_per_view_sample": "≤ 600",
     "export.cryptomatte_error": "≤ 0.39 %",
+    "import.clay_s": "≤ 3 s",
     "assets.rmse_median": "≤ 4 %",
     "assets.rmse_p90": "≤ 12 %",
     "assets.flip_median": "≤ 0.03",
