@@ -47,7 +47,7 @@ class Control:
     scale: str = "linear"
 
 
-class LookWidget(anywidget.AnyWidget):  # type: ignore[misc]
+class LookWidget(anywidget.AnyWidget):
     """Live image of a bake, with sliders for numbers of its look.
 
         widget = LookWidget(bake, ["Bowl.roughness", "environment.rotation", ("Key light.intensity", 0, 50)])
@@ -63,7 +63,7 @@ class LookWidget(anywidget.AnyWidget):  # type: ignore[misc]
     """
 
     _esm = Path(__file__).with_name("widget.js")
-    controls = traitlets.List().tag(sync=True)
+    controls: traitlets.List[Any] = traitlets.List().tag(sync=True)
     title = traitlets.Unicode().tag(sync=True)
     can_orbit = traitlets.Bool(False).tag(sync=True)
 
