@@ -254,8 +254,9 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """Leave the session."""
-        self._thread.run(self._session.close())
+        """Leave the session; it has ended if its client is closed."""
+        if self._thread.close.alive:
+            self._thread.run(self._session.close())
 
     def __getitem__(self, name: str) -> Any:
         """A material or light of the look by name."""
