@@ -18,7 +18,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.look import default_look, validate
-from relume.output.exr.aovs import SAMPLES, AovTracer
+from relume.output.exr.aovs import POSITIONS, SAMPLES, AovTracer
 from relume.output.exr.export import AovPass, export_exr
 from relume.raytrace.camera_rays import camera_directions, trace_rays
 from relume.scene.examples.still_life import demo_scene
@@ -41,7 +41,7 @@ def measure(tiny: bool) -> list[Figure]:
         export_exr(path, lambda *_: image, look, [], {}, aovs=AovPass(tracer, camera, size))
         coverage = read_coverage(path, _LAYER)
     names = [mesh.name for mesh in scene.meshes]
-    own = _count(tracer, camera, size, _own_positions())
+    own = _count(tracer, camera, size, POSITIONS)
     fine = _count(tracer, camera, size, _grid(side))
     errors = [np.abs(coverage[name] - own[k]).max() for k, name in enumerate(names)]
     sampling = np.array([coverage[name] - fine[k] for k, name in enumerate(names)])
@@ -77,11 +77,6 @@ def read_coverage(path: Path, layer: str) -> dict[str, Shaped[F64, "height width
         )
         for name, text in manifest.items()
     }
-
-
-def _own_positions() -> Shaped[F64, "n 2"]:
-    k = np.arange(SAMPLES)
-    return (np.stack([k, 7 * k % SAMPLES], axis=1) + 0.5) / SAMPLES
 
 
 def _grid(side: int) -> Shaped[F64, "n 2"]:

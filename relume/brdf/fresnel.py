@@ -35,3 +35,8 @@ def fresnel(cos_theta_d: F64, ior: float | F64, extinction: float) -> F64:
 def schlick(cos_theta_d: F64, f0: float | F64) -> F64:
     """Schlick's reflectance f0 + (1 - f0)(1 - cos θd)^5 (eq. 15, Schlick 1994); f0: at normal incidence, in [0, 1]."""
     return f0 + (1.0 - f0) * (1.0 - cos_theta_d) ** 5
+
+
+def normal_reflectance(ior: float) -> float:
+    """Reflectance ((η - 1) / (η + 1))² of a dielectric at normal incidence. ior: index of refraction η"""
+    return ((ior - 1) / (ior + 1)) ** 2

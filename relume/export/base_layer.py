@@ -5,8 +5,8 @@
     blend       L = b (1 − m) (1 − R),  f0 = mix(0.04, b, m),  f90 = 1
 
 with base color b, metalness m, specular s and its color c, reflectance f of the index of refraction, and the mean
-reflectance R of the dielectric: the inverse of `relume.scene_io.gltf.materials`. Glass transmits a fraction t of the
-light of its diffuse layer: L = b (1 − t) (1 − R), and its tint is b t.
+reflectance R of the dielectric: the inverse of `relume.scene_io.surfaces.make_material`. Glass transmits a fraction t
+of the light of its diffuse layer: L = b (1 − t) (1 − R), and its tint is b t.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import normal_reflectance
 from relume.export.export_images import ExportImages, color_image, resized, rgb
 from relume.images.base_color import DIELECTRIC, diffuse_fraction, solve_base_color
 from relume.scene.model import Glass, Texture
@@ -205,11 +206,6 @@ def _blend_error(albedo: NDArray[Any], f0: NDArray[Any], base: F64, metallic: F6
     """Largest difference of the reflectances of a blend."""
     diffuse = base * (1 - metallic) * diffuse_fraction(np.full(3, DIELECTRIC))
     return float(max(np.abs(diffuse - albedo).max(), np.abs(lerp(DIELECTRIC, base, metallic) - f0).max()))
-
-
-def normal_reflectance(ior: float) -> float:
-    """Reflectance at normal incidence of an index of refraction."""
-    return ((ior - 1) / (ior + 1)) ** 2
 
 
 def index_of_refraction(reflectance: float) -> float:

@@ -8,19 +8,21 @@ from math import isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import normal_reflectance
 from relume.core.import_warnings import quote
-from relume.export.base_layer import index_of_refraction, normal_reflectance
+from relume.export.base_layer import index_of_refraction
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial
 from relume.export.surface_values import microfacet_widths
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_inputs import Color, Rgb, Value, scaled
-from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+from relume.scene_io.surfaces.surface_inputs import Color, Value, scaled
+from relume.scene_io.surfaces.surface_parameters import BLACK, WHITE, SurfaceParameters
 
 Inputs = dict[str, Value]
 _COAT_IOR = 1.5  # of glTF, and of the term
-_BLACK: Rgb = (0.0, 0.0, 0.0)
-_WHITE: Rgb = (1.0, 1.0, 1.0)
+IMAGE_FOLDER = "textures"
+ADDRESS_MODES = {"repeat": "periodic", "mirror": "mirror", "clamp": "clamp"}
+"""Wrap modes of MaterialX."""
 
 
 def open_pbr_inputs(material: ExportMaterial, images: ExportImages) -> Inputs:
@@ -43,12 +45,12 @@ def open_pbr_inputs(material: ExportMaterial, images: ExportImages) -> Inputs:
     if surface.clearcoat != 0:
         coat = {"coat_weight": surface.clearcoat, "coat_roughness": surface.clearcoat_roughness}
         inputs |= {**coat, "coat_ior": _COAT_IOR, "coat_darkening": 0.0}
-    if surface.sheen_color != _BLACK:
+    if surface.sheen_color != BLACK:
         fuzz = {"fuzz_color": surface.sheen_color, "fuzz_roughness": surface.sheen_roughness}
         inputs |= {"fuzz_weight": 1.0, **fuzz}
     if surface.transmission != 0:
         inputs |= _transmission(surface)
-    if surface.emission != _BLACK:
+    if surface.emission != BLACK:
         inputs |= {"emission_color": surface.emission, "emission_luminance": surface.emission_strength}
     if surface.alpha_mode != "OPAQUE":
         inputs["geometry_opacity"] = _opacity(material, images)
@@ -65,7 +67,7 @@ def omitted_from_open_pbr(material: ExportMaterial) -> tuple[str, ...]:
         f"The thickness of {label} is not part of OpenPBR.": is_solid,
         f"The tint of the surface of {label} is not part of OpenPBR; that of its inside is.": is_solid
         and isfinite(surface.attenuation_distance)
-        and surface.base_color != _WHITE,
+        and surface.base_color != WHITE,
     }
     return tuple(sentence for sentence, applies in sentences.items() if applies)
 

@@ -18,6 +18,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.math.polar import polar
 from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface, make_terms
 
 F64 = NDArray[np.float64]
@@ -56,7 +57,7 @@ def direction_pairs(*, is_isotropic: bool) -> DirectionPairs:
     phi_h = (np.arange(sides * _NUM_AZIMUTHS) + 0.5) / _NUM_AZIMUTHS * np.pi
     to, po, tilt, ph = (g.ravel() for g in np.meshgrid(theta_o, phi_o, u, phi_h, indexing="ij"))
     theta_h, step = np.pi / 2 * tilt**_DENSITY, tilt ** (_DENSITY - 1)
-    wo, half = _polar(to, po), _polar(theta_h, ph)
+    wo, half = polar(to, po), polar(theta_h, ph)
     cos_d = np.einsum("nc,nc->n", wo, half)
     wi = 2 * cos_d[:, None] * half - wo
     above = (cos_d > 0) & (wi[:, 2] > _MIN_COSINE)
@@ -118,7 +119,3 @@ def lobes(along: float, across: float, pairs: DirectionPairs) -> tuple[F64, F64,
     view_and_light = (v[:, 2] + np.linalg.norm(v * [along, across, 1.0], axis=1) for v in (wi, wo))
     lobe = ndf / np.prod([*view_and_light], axis=0)
     return np.full(len(wi), 1 / np.pi), lobe * (1 - rise), lobe * rise
-
-
-def _polar(theta: F64, phi: F64) -> Shaped[F64, "n 3"]:
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)

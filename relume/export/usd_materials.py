@@ -6,17 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from relume.export.base_layer import normal_reflectance
+from relume.brdf.fresnel import normal_reflectance
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial
-from relume.export.open_pbr_inputs import open_pbr_inputs
+from relume.export.open_pbr_inputs import ADDRESS_MODES, IMAGE_FOLDER, open_pbr_inputs
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_inputs import Color, Rgb, Value, scaled
-from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
+from relume.scene_io.surfaces.surface_inputs import Color, Value, scaled
+from relume.scene_io.surfaces.surface_parameters import WHITE, SurfaceParameters
 
-IMAGE_FOLDER = "textures"
-_WHITE: Rgb = (1.0, 1.0, 1.0)
-_ADDRESS_MODES = {"repeat": "periodic", "mirror": "mirror", "clamp": "clamp"}
 _SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 
@@ -109,13 +106,13 @@ class UsdMaterials:
         _set(image, "file", "Asset", self._asset(value))
         image.GetInput("file").GetAttr().SetColorSpace("srgb_texture" if value.is_srgb else "raw")
         for axis, wrap in zip("uv", value.wrap, strict=True):
-            _set(image, f"{axis}addressmode", "String", _ADDRESS_MODES[wrap])
+            _set(image, f"{axis}addressmode", "String", ADDRESS_MODES[wrap])
         value_type = getattr(Sdf.ValueTypeNames, kind)
         output = image.CreateOutput("out", value_type)
         if kind == "Float3":
             node, source = self._shader(path, f"{name}_map", "ND_normalmap_float"), "in"
             _set(node, "scale", "Float", value.factor[0])
-        elif value.factor == _WHITE:
+        elif value.factor == WHITE:
             return output
         else:
             node, source = self._shader(path, f"{name}_scaled", f"ND_multiply_{type_name}"), "in1"
@@ -144,7 +141,7 @@ def _preview_inputs(surface: SurfaceParameters) -> dict[str, Value]:
         "ior": surface.ior,
         "emissiveColor": _scaled_color(surface.emission, surface.emission_strength),
     }
-    if surface.specular == 1 and surface.specular_color == _WHITE:
+    if surface.specular == 1 and surface.specular_color == WHITE:
         inputs["metallic"] = surface.metallic
     else:
         weight = surface.specular if isinstance(surface.specular, float) else 1.0

@@ -11,14 +11,12 @@ from relume.core.filesystem import atomic_write
 from relume.export.export_document import ExportDocument
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial
-from relume.export.open_pbr_inputs import omitted_from_open_pbr, open_pbr_inputs
+from relume.export.open_pbr_inputs import ADDRESS_MODES, IMAGE_FOLDER, omitted_from_open_pbr, open_pbr_inputs
 from relume.scene_io.surfaces.surface_images import ImageInput
-from relume.scene_io.surfaces.surface_inputs import Rgb, Value
+from relume.scene_io.surfaces.surface_inputs import Value
+from relume.scene_io.surfaces.surface_parameters import WHITE
 
-IMAGE_FOLDER = "textures"
 DOCUMENT = "materials.mtlx"
-_ADDRESS_MODES = {"repeat": "periodic", "mirror": "mirror", "clamp": "clamp"}
-_WHITE: Rgb = (1.0, 1.0, 1.0)
 
 
 def omitted_from_materialx(export: ExportDocument) -> tuple[str, ...]:
@@ -116,9 +114,9 @@ class _MaterialWriter:
         if value.is_srgb:
             file.setColorSpace("srgb_texture")
         for axis, wrap in zip("uv", value.wrap, strict=True):
-            image.setInputValue(f"{axis}addressmode", _ADDRESS_MODES[wrap], "string")
+            image.setInputValue(f"{axis}addressmode", ADDRESS_MODES[wrap], "string")
         self.files[value.file] = None
-        if value.factor == _WHITE or type_name == "vector3":
+        if value.factor == WHITE or type_name == "vector3":
             return image
         product = self._document.addNode("multiply", f"{name}_{key}_scaled", type_name)
         product.addInput("in1", type_name).setNodeName(image.getName())

@@ -16,12 +16,13 @@ from relume.core.import_warnings import quote
 from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial
 from relume.export.light_frames import light_frame
-from relume.export.open_pbr_inputs import omitted_from_open_pbr
-from relume.export.usd_materials import IMAGE_FOLDER, UsdMaterials, omitted_from_preview
+from relume.export.open_pbr_inputs import IMAGE_FOLDER, omitted_from_open_pbr
+from relume.export.usd_materials import UsdMaterials, omitted_from_preview
 from relume.image_io.write_image import write_image
 from relume.look.model import LightLook, RectangleLook
 from relume.raytrace.tangents import unit
 from relume.scene.model import Camera, Mesh
+from relume.scene.unique_names import append_number
 from relume.scene_io.usd.layers import INSTALL
 
 VARIANT_SET = "look"
@@ -78,7 +79,7 @@ class _StageWriter:
 
     def __init__(self, export: ExportDocument, stage: Any, folder: Path) -> None:
         self._export, self._stage, self._folder = export, stage, folder
-        self._names: set[Any] = set()
+        self._used_paths: dict[str, int] = {}
         self._materials = UsdMaterials(stage, export.images)
 
     def build(self) -> list[str]:
@@ -108,12 +109,8 @@ class _StageWriter:
         """An unused path; the prim's display name is the name as it is."""
         from pxr import Sdf, Tf
 
-        folder, identifier = Sdf.Path(f"{_ROOT}/{group}"), Tf.MakeValidIdentifier(name.strip() or group[:-1])
-        path, number = folder.AppendChild(identifier), 2
-        while path in self._names:
-            path, number = folder.AppendChild(f"{identifier}_{number}"), number + 1
-        self._names.add(path)
-        return path
+        identifier = Tf.MakeValidIdentifier(name.strip() or group[:-1])
+        return Sdf.Path(append_number(f"{_ROOT}/{group}/{identifier}", "_", self._used_paths))
 
     def _bind(self, root: Any, meshes: list[Any], defined: dict[int, Any]) -> None:
         """Bind materials; those that a variant replaces in each variant, since others are stronger."""
@@ -122,9 +119,9 @@ class _StageWriter:
             self._bind_all(meshes, self._export.materials, defined)
             return
         variant_set = root.GetVariantSets().AddVariantSet(VARIANT_SET)
-        names: dict[str, str] = {}
+        names, used_names = dict[str, str](), dict[str, int]()
         for name in variants:
-            names[name] = _unused(_variant_name(name), set(names.values()))
+            names[name] = append_number(_variant_name(name), "_", used_names)
             variant_set.AddVariant(names[name])
         for name, materials in variants.items():
             variant_set.SetVariantSelection(names[name])
@@ -228,10 +225,3 @@ def _transform(prim: Any, to_world: NDArray[np.float64]) -> None:
 def _variant_name(name: str) -> str:
     """Letters, digits, dashes and underscores."""
     return "".join(letter if letter.isascii() and (letter.isalnum() or letter in "-_") else "_" for letter in name)
-
-
-def _unused(name: str, used: set[str]) -> str:
-    candidate, number = name, 2
-    while candidate in used:
-        candidate, number = f"{name}_{number}", number + 1
-    return candidate

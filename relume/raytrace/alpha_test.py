@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import normal_reflectance
 from relume.core.errors import ChunkDamagedError
 from relume.scene.model import WRAPS, Glass, Material, Opacity
 
@@ -95,7 +96,7 @@ def _glass_rule(glass: Glass) -> tuple[float, ...]:
     return (
         GLASS_RULE,
         *transmittance.tolist(),
-        ((glass.ior - 1) / (glass.ior + 1)) ** 2,
+        normal_reflectance(glass.ior),
         2.0 if glass.thickness > 0 else 1.0,
     )
 

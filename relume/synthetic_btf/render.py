@@ -24,9 +24,10 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from relume.assets.btf.direction_rings import DirectionGrid, directions, interpolation_weights_numpy, polar
+from relume.assets.btf.direction_rings import DirectionGrid, directions, interpolation_weights_numpy
 from relume.brdf.albedo import reflectance
 from relume.brdf.evaluate import eval_brdf
+from relume.math.polar import polar
 from relume.raytrace.camera_rays import Hits, trace_rays
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.tangents import any_tangent

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from relume.core.errors import MaterialError
 from relume.core.numba_options import NO_REFCOUNT
 from relume.math.fast_math import acos_clamped, azimuth_fraction
+from relume.math.polar import polar
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -87,11 +88,6 @@ def directions(grid: DirectionGrid) -> Shaped[F64, "n 3"]:
     theta = np.repeat(grid.theta.astype(np.float64), count)
     phi = np.concatenate([2 * np.pi * (np.arange(n) + start) / n for n, start in zip(count, grid.shift, strict=True)])
     return polar(theta, phi)
-
-
-def polar(theta: Shaped[F64, " n"], phi: Shaped[F64, " n"]) -> Shaped[F64, "n 3"]:
-    """Unit vectors from angles in radians."""
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)

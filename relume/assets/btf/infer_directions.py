@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.btf.direction_rings import MAX_DIRECTIONS, DirectionGrid, directions, make_direction_grid, polar
+from relume.assets.btf.direction_rings import MAX_DIRECTIONS, DirectionGrid, directions, make_direction_grid
 from relume.core.errors import MaterialError
+from relume.math.polar import polar
 
 F64 = NDArray[np.float64]
 

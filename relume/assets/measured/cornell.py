@@ -24,6 +24,7 @@ from relume.assets.measured.measurement import Measurement, coverage_warnings, s
 from relume.assets.measured.merl import MAX_VALUE, grid_angles
 from relume.assets.measured.spectra import rec709_weights
 from relume.core.errors import MaterialError
+from relume.math.polar import polar
 
 F64 = NDArray[np.float64]
 
@@ -106,10 +107,7 @@ def _check(label: str, wavelengths: F64, rows: F64) -> None:
 
 def _coordinates_of_rows(angles: Shaped[F64, "n 4"]) -> Shaped[F64, "n 4"]:
     """Coordinates of pairs of directions, given by θi, φi, θs, φs."""
-    wi, wo = (
-        np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
-        for theta, phi in ((angles[:, 0], angles[:, 1]), (angles[:, 2], angles[:, 3]))
-    )
+    wi, wo = (polar(theta, phi).T for theta, phi in ((angles[:, 0], angles[:, 1]), (angles[:, 2], angles[:, 3])))
     half = wi + wo
     length, across = np.linalg.norm(half, axis=0), np.hypot(half[0], half[1])
     # as in `relume.assets.measured.interpolate`: sin θh sin θd times cosine and sine of φd, up to a factor

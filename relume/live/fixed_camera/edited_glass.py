@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import normal_reflectance
 from relume.camera.glass_passages import GlassPassages
 from relume.core.errors import CancelledError, RelumeError, ResultUnavailableError
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
@@ -182,7 +183,7 @@ def color_change(
 
 def _transmittance(glass: GlassLook) -> Shaped[NDArray[np.float64], " 3"]:
     """Transmittance of a surface at normal incidence."""
-    return (1 - ((glass.ior - 1) / (glass.ior + 1)) ** 2) * np.array(glass.color)
+    return (1 - normal_reflectance(glass.ior)) * np.array(glass.color)
 
 
 def _factors(view: View, change: Shaped[F32, "pixels 3"]) -> Shaped[F32, "n 3"]:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.fresnel import schlick
+from relume.brdf.fresnel import normal_reflectance, schlick
 from relume.look.glass import GlassOfLook
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.alpha_test import GLASS_RULE, AlphaMasks
@@ -84,7 +84,7 @@ def edited_rules(
         color = np.array(glass.color, np.float32)
         # absorption in solids stays as in the scene, since bakes do not store their thickness
         absorbed = np.divide(rules[row, 1:4], color, out=np.ones(3, np.float32), where=color > 0)
-        rules[row, 1:4], rules[row, 4] = new.color * absorbed, ((new.ior - 1) / (new.ior + 1)) ** 2
+        rules[row, 1:4], rules[row, 4] = new.color * absorbed, normal_reflectance(new.ior)
     return rules
 
 

@@ -27,6 +27,7 @@ from relume.brdf.fresnel import fresnel, schlick
 from relume.brdf.registry import TERMS
 from relume.core.color import srgb_encode
 from relume.look.library.materials import DATA, make_preset_terms
+from relume.math.polar import polar
 
 Fit = Mapping[str, Any]
 Params = dict[str, float]
@@ -134,7 +135,7 @@ def compute_swatch(terms: list[dict[str, Any]]) -> str:
     """Color under uniform light, viewed at 45 degrees, as "#rrggbb"."""
     edges = np.concatenate([[0.0], np.geomspace(1e-3, np.pi / 2, 120)])
     theta, phi = np.meshgrid(0.5 * (edges[1:] + edges[:-1]), (np.arange(48) + 0.5) * (np.pi / 24), indexing="ij")
-    half = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    half = polar(theta, phi)
     wo = np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5)])
     cosine = half @ wo
     wi = 2.0 * cosine[..., None] * half - wo

@@ -149,7 +149,7 @@ class _CameraRays(NamedTuple):
     @staticmethod
     def through(camera: Camera, size: tuple[int, int], rows: range) -> _CameraRays:
         y, x = np.divmod(np.arange(rows.start * size[0], rows.stop * size[0], dtype=np.int64), size[0])
-        offset_x, offset_y = _POSITIONS.T
+        offset_x, offset_y = POSITIONS.T
         directions = camera_directions(
             camera, size, (x[:, None] + offset_x).ravel().astype(np.float32),
             (y[:, None] + offset_y).ravel().astype(np.float32),
@@ -180,8 +180,9 @@ def _positions() -> Shaped[NDArray[np.float64], "samples 2"]:
     return (np.stack([k, 7 * k % SAMPLES], axis=1) + 0.5) / SAMPLES
 
 
-_POSITIONS = _positions()
-_CENTRAL = int(np.argmin(((_POSITIONS - 0.5) ** 2).sum(axis=1)))
+POSITIONS = _positions()
+"""Positions of the rays in a pixel."""
+_CENTRAL = int(np.argmin(((POSITIONS - 0.5) ** 2).sum(axis=1)))
 _ALPHA_SAMPLES = ((11 * np.arange(SAMPLES) % SAMPLES + 0.5) / SAMPLES).astype(np.float32)
 
 

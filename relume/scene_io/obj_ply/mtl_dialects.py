@@ -27,6 +27,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import normal_reflectance
 from relume.brdf.registry import TERMS
 from relume.scene.model import Glass, Texture
 from relume.scene.validate import MAX_IOR
@@ -127,7 +128,7 @@ def make_glass_terms(mtl_material: MtlMaterial, glass: Glass, textures: Mapping[
         mtl_material: its numbers. glass: of `make_glass`. textures: textures by channel.
     """
     base = np.array(_color(mtl_material.numbers, "Kd", [0.0, 0.0, 0.0], textures.get("diffuse")))
-    f0 = ((glass.ior - 1) / (glass.ior + 1)) ** 2
+    f0 = normal_reflectance(glass.ior)
     return make_terms(_surface(base * (1 - np.array(glass.tint)), f0, 0.0, glass.roughness, textures), CoatLayer())
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.fresnel import normal_reflectance
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
@@ -311,7 +312,7 @@ def f0_of(surface: SurfaceParameters) -> float:
 
 def _f0(ior: float) -> float:
     """Reflectance of a dielectric at normal incidence; an index of 0 means a mirror, as in the extension."""
-    return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2
+    return 1.0 if ior == 0 else normal_reflectance(ior)
 
 
 def _normalize_roughness(raster: Raster) -> Texture:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -93,15 +93,14 @@ class MaterialTextures:
         """
         self._images, self._surface, self._colors = images, surface, colors
         self._label, self._warnings = label, warnings
-        self._textures = {
-            key: texture for key, group in _groups(surface).items() if (texture := _packed(group)) is not None
-        }
-        self._warn_clamped(surface)
+        groups = _groups(surface)
+        self._textures = {key: texture for key, group in groups.items() if (texture := _packed(group)) is not None}
+        self._warn_clamped(groups.values())
         self.transforms = UvTransforms([texture.slot for texture in self._textures.values()], label, warnings)
 
-    def _warn_clamped(self, surface: SurfaceParameters) -> None:
+    def _warn_clamped(self, groups: Iterable[_Group]) -> None:
         """Warn about images that are brighter than 1 in the file, where textures cannot be."""
-        for group in _groups(surface).values():
+        for group in groups:
             images = [value for value in group.values.values() if isinstance(value, ImageInput)]
             if (
                 np.isfinite(group.maximum)

@@ -54,6 +54,11 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
             (transfer.key, "scene"), lambda: StaticViewBuilder.from_bake(transfer, scene_of(transfer))
         )
 
+    def aov_tracer(transfer: Any, look: Any) -> AovTracer:
+        """The tracer of a look, which all frames of a turntable share."""
+        key = transfer.key, "AOVs", look.model_dump_json()
+        return memory.transient.get_value(key, lambda: AovTracer.from_look(scene_of(transfer), look))
+
     def make_picture(transfer: Any, view: str) -> Any:
         def make_static_view(*camera_args: Any, **options: Any) -> Any:
             # in the job's thread, because reading a scene takes long
@@ -77,7 +82,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         open_transient=lambda path: open_cached(path, lambda store: open_bake(store, memory.transient)),
         make_picture=make_picture,
         render=render,
-        aov_tracer=lambda transfer, look: AovTracer.from_look(scene_of(transfer), look),
+        aov_tracer=aov_tracer,
         render_small=render_small,
         reference=reference,
         open_viewport=open_viewport,

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, polar, ubo_grid
+from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
 from relume.core.color import srgb_decode
 from relume.core.errors import ParameterError, SceneError
+from relume.math.polar import polar
 from relume.synthetic_btf.corduroy import corduroy
 from relume.synthetic_btf.from_images import ReliefTile
 from relume.synthetic_btf.from_mesh import read_tile
