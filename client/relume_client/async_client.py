@@ -310,16 +310,13 @@ def _format(target: Path) -> str:
 
 def _companions(scene: Path, companions: Sequence[str | os.PathLike[str]]) -> list[tuple[str, Path]]:
     """Companion files with their names relative to the scene's folder; folders stand for all files in them."""
-    paths = [Path(companion) for companion in companions]
+    paths = [Path(companion).resolve() for companion in companions]
     files = [file for path in paths for file in (sorted(path.rglob("*")) if path.is_dir() else [path])]
-    files = [file for file in files if not file.is_dir() and file != scene]
+    files = [file for file in files if not file.is_dir() and file != scene.resolve()]
     if len(files) > _MAX_COMPANIONS:
         raise ValueError(f"{len(files)} companions are more than {_MAX_COMPANIONS}; send a .zip of the scene")
     folder = scene.resolve().parent
-    return [
-        (path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name, path)
-        for path in (file.resolve() for file in files)
-    ]
+    return [(path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name, path) for path in files]
 
 
 def _progress_line(label: str) -> Callable[[BakeBody | RenderBody], None]:

@@ -62,10 +62,11 @@ def _quick_imports(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_quick_imports")
 def test_scene_with_companions_is_imported(client: Client, tmp_path: Path) -> None:
-    (tmp_path / "colors").mkdir()
-    (tmp_path / "colors" / "m.mtl").write_text("newmtl Red\nKd 0.8 0.1 0.1\n")
-    (tmp_path / "tri.obj").write_bytes(TRIANGLE)
-    scene = client.import_scene(tmp_path / "tri.obj", companions=[tmp_path], up="z", name="tri")
+    folder = tmp_path / "model"
+    (folder / "colors").mkdir(parents=True)
+    (folder / "colors" / "m.mtl").write_text("newmtl Red\nKd 0.8 0.1 0.1\n")
+    (folder / "tri.obj").write_bytes(TRIANGLE)
+    scene = client.import_scene(folder / "tri.obj", companions=[folder], up="z", name="tri")
     assert (scene.info["name"], scene.info["import_options"]["up"]) == ("tri", "z")
     assert [material["name"] for material in scene.info["materials"]] == ["Red"]
     assert scene.id in [other.id for other in client.scenes()]

@@ -28,28 +28,28 @@ def generated(client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     document.write_text(json.dumps(client.get("/api/openapi.json").json()))
     file = ConfigFile(post_hooks=[], content_type_overrides=dict.fromkeys(AS_BYTES, "application/octet-stream"))
     config = Config.from_sources(
-        file, MetaType.NONE, document, "utf-8", overwrite=True, output_path=tmp_path / "relume_client"
+        file, MetaType.NONE, document, "utf-8", overwrite=True, output_path=tmp_path / "generated_client"
     )
     problems = openapi_python_client.generate(config=config)
     assert [f"{problem.header} {problem.detail}" for problem in problems] == []
     monkeypatch.syspath_prepend(tmp_path)
     before = set(sys.modules)
-    yield importlib.import_module("relume_client")
+    yield importlib.import_module("generated_client")
     for name in set(sys.modules) - before:
-        if name.startswith("relume_client"):
+        if name.startswith("generated_client"):
             del sys.modules[name]
 
 
 def call(name: str, **values: Any) -> Any:
-    return importlib.import_module(f"relume_client.api.{name}").sync_detailed(**values)
+    return importlib.import_module(f"generated_client.api.{name}").sync_detailed(**values)
 
 
 def model(name: str) -> Any:
-    return getattr(importlib.import_module("relume_client.models"), name)
+    return getattr(importlib.import_module("generated_client.models"), name)
 
 
 def test_generated_client_imports_bakes_and_downloads(generated: ModuleType, client: TestClient) -> None:
-    from relume_client.types import File  # type: ignore[import-not-found]
+    from generated_client.types import File  # type: ignore[import-not-found]
 
     api = generated.Client(base_url="http://testserver")
     api.set_httpx_client(client)
