@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Any
@@ -84,6 +85,15 @@ def test_secret_files_are_ignored_by_git_and_docker() -> None:
     secrets = {each["file"].removeprefix("./") for each in read("compose.production.yml")["secrets"].values()}
     for name in (".gitignore", ".dockerignore"):
         assert {f"docker/{secret}" for secret in secrets} <= set((DOCKER.parent / name).read_text().split())
+
+
+def test_image_contains_all_packages_of_the_wheel() -> None:
+    project = tomllib.loads((DOCKER.parent / "pyproject.toml").read_text())
+    packages = project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    folders = {package.partition("/")[0] for package in packages}
+    copied = set(re.findall(r"^COPY (\w+)/ \1/$", (DOCKER / "Dockerfile").read_text(), re.MULTILINE))
+    assert folders <= copied
+    assert {f"!{folder}/" for folder in folders} <= set((DOCKER.parent / ".dockerignore").read_text().split())
 
 
 def test_team_overlay_gives_time_to_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
