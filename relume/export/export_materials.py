@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -57,6 +59,12 @@ class ExportMaterial:
         return self.surface.normal is not None or self.surface.anisotropy > 0
 
 
+@lru_cache(maxsize=1024)  # a report is followed by its file, and looks share most materials
+def _fit(terms: str) -> PrincipledFit:
+    """The surface of terms as JSON."""
+    return fit_principled(json.loads(terms))
+
+
 class MaterialExporter:
     """Converts the materials of one scene; equal materials of several looks are converted once.
 
@@ -67,7 +75,6 @@ class MaterialExporter:
     def __init__(self, scene: Scene, images: ExportImages) -> None:
         self._scene, self._images = scene, images
         self._is_projected = find_triplanar(scene)
-        self._fits: dict[str, PrincipledFit] = {}
         self._materials: dict[tuple[Any, ...], ExportMaterial] = {}
 
     def materials(self, look: Look) -> list[ExportMaterial]:
@@ -95,10 +102,7 @@ class MaterialExporter:
         terms = [dict(term) for term in look.terms]
         maps, roughness_map = _maps(material, terms), _roughness_map(material, terms)
         mean_terms = _at_mean(terms, maps)
-        key = repr(mean_terms)
-        if key not in self._fits:
-            self._fits[key] = fit_principled(mean_terms)
-        fit = self._fits[key]
+        fit = _fit(json.dumps(mean_terms))
         layer = base_layer(fit.surface, maps, material.glass, self._images, material.name)
         uniform = base_layer(fit.surface, Maps(), material.glass, self._images, material.name)
         error = surface_error(mean_terms, fit._replace(surface=pbr_surface(_parameters(uniform, fit))))

@@ -148,6 +148,7 @@ BOUNDED = {
     "brdf/terms/ggx_multiple.py",
     "core/numba_cache.py",
     "core/source_hash.py",
+    "export/export_materials.py",
     "export/surface_values.py",
     "image_io/ocio/config.py",
     "images/image_store.py",
