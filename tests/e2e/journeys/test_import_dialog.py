@@ -138,6 +138,7 @@ def test_the_editor_shows_clay_until_the_first_bake(start: Page, pillar: Path) -
     expect(dialog.locator(".scene-size")).to_have_text("0.40 × 0.30 × 2.00 m")
     start.keyboard.press("Escape")
     card = start.locator(".scene-card", has_text="pillar")
+    expect(card).to_have_count(1)  # the one before the option is gone
     expect(card.locator(CLAY)).to_be_visible()
     card.get_by_role("button", name="Open pillar").click()
     expect(start.locator(f".picture {CLAY}")).to_be_visible()
