@@ -9,14 +9,14 @@ Then the figure fails only if it is worse than the stored value by more than its
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
 from relume_bench.figure import Figure
-from relume_bench.table import DOCS, PAGES, TARGETS, value_text
+from relume_bench.pages import value_text
+from relume_bench.targets import TARGETS
 
 _FRACTIONS = ("relative RMSE", "relative RMS", "share")  # their targets are in percent
 HEAD = f"{'name':<38} {'value':<24} {'target':<10} ok"
@@ -55,13 +55,6 @@ def misses_target(name: str, value: float, unit: str) -> bool:
     """
     low, high = bounds(TARGETS.get(name, ""), unit)
     return not low <= value <= high  # NaN is past every target
-
-
-def stored_figures() -> dict[str, dict[str, Any]]:
-    """Entries of both pages by name; an installed package has none."""
-    files = [DOCS / f"{page}.json" for page in PAGES]
-    pages = (json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file())
-    return {entry["name"]: entry for page in pages for entry in page}
 
 
 def judge(figure: Figure, stored: dict[str, dict[str, Any]]) -> Verdict:

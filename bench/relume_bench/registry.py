@@ -13,10 +13,11 @@ from datetime import date
 from typing import Any
 
 from relume.store.schema import SCHEMA_VERSION
-from relume_bench.check import HEAD, Verdict, judge, line, stored_figures
+from relume_bench.check import HEAD, Verdict, judge, line
 from relume_bench.figure import Figure
 from relume_bench.machine import measure_stolen_fraction, processor_ticks
 from relume_bench.measured_code import is_older, measured_code
+from relume_bench.pages import stored_figures
 
 
 @dataclass(frozen=True)

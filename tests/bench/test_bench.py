@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relume_bench import load, registry, table
+from relume_bench import load, pages, registry, table
 from relume_bench.figure import Figure
 from relume_bench.machine import measure_stolen_fraction
 from relume_bench.measured_code import collect_sources, measured_code
@@ -152,10 +152,10 @@ def test_merge_preserves_figures_that_were_not_measured() -> None:
     assert page.endswith("\nafter\n")
 
 
-@pytest.mark.parametrize("name", table.PAGES)
+@pytest.mark.parametrize("name", pages.PAGES)
 def test_pages_describe_every_figure(name: str) -> None:
-    text = (table.DOCS / f"{name}.md").read_text()
-    for figure in (figure for figure in registry.names() if table.find_document(figure) == name):
+    text = (pages.DOCS / f"{name}.md").read_text()
+    for figure in (figure for figure in registry.names() if pages.find_document(figure) == name):
         assert figure.removesuffix(".p50").removesuffix(".p95") in text
 
 
@@ -166,18 +166,18 @@ def test_estimate_is_shown_with_its_standard_error() -> None:
     assert "| 1.2e+06 ± 9.8e+04 × |" in table.row(ratio)
 
 
-@pytest.mark.parametrize("name", table.PAGES)
+@pytest.mark.parametrize("name", pages.PAGES)
 def test_tables_show_the_stored_figures(name: str) -> None:
-    figures = json.loads((table.DOCS / f"{name}.json").read_text())
-    text = (table.DOCS / f"{name}.md").read_text()
+    figures = json.loads((pages.DOCS / f"{name}.json").read_text())
+    text = (pages.DOCS / f"{name}.md").read_text()
     assert table.filled(text, figures) == text.replace(table.OLDER, "")  # what is older changes with each commit
     assert {figure["name"] for figure in figures} <= set(registry.names())
 
 
-@pytest.mark.parametrize("name", table.PAGES)
+@pytest.mark.parametrize("name", pages.PAGES)
 def test_rows_are_those_that_the_benchmarks_wrote(name: str) -> None:
     """A row has what `Group.measure` adds to every figure; the hash of the code since there is one."""
-    for figure in json.loads((table.DOCS / f"{name}.json").read_text()):
+    for figure in json.loads((pages.DOCS / f"{name}.json").read_text()):
         context = figure["context"]
         assert {"measured_in_s", "stolen_share", "measured_on"} <= set(context), figure["name"]
         assert re.fullmatch(r"\d{4}-\d\d-\d\d, schema \d+", context["measured_on"]), figure["name"]

@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 
-from relume_bench import registry, table
-from relume_bench.check import bounds, judge, misses_target, stored_figures
+from relume_bench import pages, registry, table
+from relume_bench.check import bounds, judge, misses_target
 from relume_bench.figure import Figure
+from relume_bench.pages import stored_figures
+from relume_bench.targets import TARGETS
 
 ERROR = "relative RMSE"
 MISS = {"reason": "hard", "noise": 0.1}
@@ -40,9 +42,9 @@ def test_bounds_of_a_target_are_in_the_unit_of_the_figure(
 
 def test_every_target_that_limits_a_figure_is_understood() -> None:
     """Only a paper's own number, to compare with, limits nothing."""
-    unlimited = {name for name, target in table.TARGETS.items() if bounds(target, "") == (-math.inf, math.inf)}
+    unlimited = {name for name, target in TARGETS.items() if bounds(target, "") == (-math.inf, math.inf)}
     assert unlimited == {"factorization.phong_terms_per_exponent"}
-    assert set(table.TARGETS) <= set(registry.names())
+    assert set(TARGETS) <= set(registry.names())
 
 
 @pytest.fixture
@@ -102,9 +104,9 @@ def test_reasons_survive_a_new_measurement() -> None:
 
 def test_quick_figures_are_accuracy_and_all_have_been_stored() -> None:
     quick = [name for group in registry.GROUPS if group.is_quick for name in group.names]
-    assert {table.find_document(name) for name in quick} == {"accuracy"}
+    assert {pages.find_document(name) for name in quick} == {"accuracy"}
     assert set(quick) <= set(stored_figures())
-    assert all(any(name in table.TARGETS for name in group.names) for group in registry.GROUPS if group.is_quick)
+    assert all(any(name in TARGETS for name in group.names) for group in registry.GROUPS if group.is_quick)
 
 
 def make_group(monkeypatch: pytest.MonkeyPatch, *figures: Figure, is_quick: bool = True) -> registry.Group:
