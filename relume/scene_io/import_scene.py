@@ -15,6 +15,7 @@ from relume.scene_io.obj_ply import import_obj, import_ply, import_stl, is_stl
 from relume.scene_io.placement import place
 from relume.scene_io.referenced_files import Companions, Folder, NoFiles
 from relume.scene_io.root_layer import is_usd
+from relume.scene_io.text_encoding import to_utf8
 from relume.scene_io.usd import import_usd
 from relume.scene_io.zip_scene import open_zip
 
@@ -48,6 +49,7 @@ def import_scene(
         companions = NoFiles() if isinstance(source, bytes) else Folder(Path(source).parent)
     if data.startswith(b"PK"):
         data, companions = open_zip(data)
+    data = to_utf8(data)
     options = options or ImportOptions()
     return place(_read(data, name, environment, companions, options), options)
 

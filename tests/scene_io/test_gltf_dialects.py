@@ -153,6 +153,12 @@ def test_all_faults_of_a_file_are_listed() -> None:
     assert all(part in warnings for part in ("accessor 98", "“doubleSided” is “maybe”", "“alphaMode” is 5"))
 
 
+def test_files_of_the_first_version_are_named() -> None:
+    first = {"buffers": {"b": {"uri": "b.bin"}}, "meshes": {}, "nodes": {}, "scenes": {}}
+    with pytest.raises(SceneError, match=r"the scene is glTF 1\.0.*export it as glTF 2\.0"):
+        import_gltf(json.dumps(first).encode(), "test", LIGHT)
+
+
 @pytest.mark.parametrize("padding", [b"\0", b"\0\0\0", b" \0"])
 def test_json_padded_by_zeros_is_read(padding: bytes) -> None:
     glb = Glb().quad()

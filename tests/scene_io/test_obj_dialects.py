@@ -80,6 +80,21 @@ def test_byte_order_marks_change_nothing() -> None:
         assert scene.warnings == ()
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_text_of_two_bytes_is_read(encoding: str) -> None:
+    mtl = "\ufeffnewmtl Grün\nKd 1 0 0\n".encode(encoding)
+    scene = imported(("\ufeff" + TEXTURED.replace("usemtl a", "usemtl Grün")).encode(encoding), m__mtl=mtl)
+    assert [material.name for material in scene.materials] == ["Grün"]
+    assert diffuse(scene) == [1, 0, 0]
+    assert scene.warnings == ()
+
+
+def test_a_library_with_another_suffix_is_found() -> None:
+    scene = imported(TEXTURED.replace("m.mtl", "m.mat"), m__mtl="newmtl a\nKd 1 0 0\n")
+    assert diffuse(scene) == [1, 0, 0]
+    assert "“m.mat” is missing; “m.mtl” beside it is used" in str(only_warning(scene))
+
+
 @pytest.mark.parametrize("line", ["a.mtl b.mtl", "none.mtl b.mtl a.mtl", "a.mtl\nmtllib b.mtl"])
 def test_several_libraries_are_read(line: str) -> None:
     obj = f"mtllib {line}\n{SQUARE}usemtl one\nf 1 2 3\nusemtl two\nf 1 3 4\n"

@@ -21,6 +21,7 @@ from relume.scene_io.gltf.tolerant import read_object
 from relume.scene_io.referenced_files import Companions
 
 MAX_JSON_VALUES = 4_000_000
+_LISTS_OF_GLTF_2 = ("buffers", "meshes", "nodes")  # in version 1.0 they are objects
 PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
 
@@ -102,6 +103,8 @@ def parse_document(json_bytes: bytes, warnings: list[ImporterWarning]) -> Docume
         )
     except (ValueError, RecursionError) as problem:
         raise SceneError(f"the scene's JSON cannot be read ({_first_line(problem)}); export it again") from None
+    if isinstance(content, dict) and any(isinstance(content.get(name), dict) for name in _LISTS_OF_GLTF_2):
+        raise SceneError("the scene is glTF 1.0, whose objects have names for numbers; export it as glTF 2.0 (.glb)")
     root = read_object(Root, content, "the scene's JSON", warnings)
     for name, limit in LIMITS.items():
         if len(getattr(root, name)) > limit:

@@ -317,7 +317,16 @@ def _library(obj: Obj, companions: Companions, warnings: list[ImporterWarning]) 
 
 
 def _read_library(companions: Companions, name: str, warnings: list[ImporterWarning]) -> bytes | None:
-    return read_companion(companions, "", name, "the material file", warnings, kind="material file")
+    """A material file; one that is missing may have kept its name with the suffix .mtl."""
+    missing: list[ImporterWarning] = []
+    data = read_companion(companions, "", name, "the material file", missing, kind="material file")
+    renamed = posixpath.splitext(name)[0] + ".mtl"
+    if data is None and renamed != name:
+        data = read_companion(companions, "", renamed, "the material file", [], kind="material file")
+        if data is not None:
+            missing = [approximated(f"The material file {quote(name)} is missing; {quote(renamed)} beside it is used.")]
+    warnings.extend(missing)
+    return data
 
 
 def _read_libraries(line: str, companions: Companions, warnings: list[ImporterWarning]) -> list[tuple[str, bytes]]:

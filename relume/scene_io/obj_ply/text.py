@@ -7,6 +7,7 @@ import re
 
 from relume.core.errors import count_text
 from relume.core.import_warnings import UNREADABLE, ImporterWarning, unsupported
+from relume.scene_io.text_encoding import to_utf8
 
 NAN_TEXT = re.compile(r"[+-]?(?:nan(?:\(\w*\))?|\d\.#\w*)", re.IGNORECASE)
 """Numbers that are none, as the C libraries of several systems write them: `-nan(ind)`, `1.#QNAN`, `-1.#IND00`."""
@@ -25,7 +26,7 @@ def number(token: str | bytes) -> float:
 
 def plain_lines(data: bytes) -> bytes:
     """Remove the byte order mark, end all lines with a line feed, and join those that a backslash continues."""
-    data = data.removeprefix(codecs.BOM_UTF8)
+    data = to_utf8(data).removeprefix(codecs.BOM_UTF8)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return data.replace(b"\\\n", b" ") if b"\\\n" in data else data
