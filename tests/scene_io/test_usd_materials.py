@@ -463,7 +463,7 @@ def test_documents_with_entities_are_not_read() -> None:
     bomb = b'<!DOCTYPE x [<!ENTITY a "aaaa">]><materialx><surfacematerial name="&a;"/></materialx>'
     body = quad() + 'def Scope "Looks" (\n references = @paint.mtlx@</MaterialX/Materials>\n) {\n}'
     scene = imported(usda(body), Files({"paint.mtlx": bomb}))
-    assert any("Skipped “paint.mtlx”: it declares entities" in warning for warning in scene.warnings)
+    assert any("Skipped “paint.mtlx”: the .mtlx file defines entities" in warning for warning in scene.warnings)
     wide = imported(usda(body), Files({"paint.mtlx": bomb.decode().encode("utf-16")}))
     assert any("Skipped “paint.mtlx”: the .mtlx file defines entities" in warning for warning in wide.warnings)
 
