@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import zipfile
 from pathlib import Path
@@ -371,3 +372,17 @@ def test_names_outside_the_folder_are_not_opened(tmp_path: Path, name: str) -> N
     (tmp_path / "a.gltf").write_bytes(document)
     with pytest.raises(SceneError, match="outside the scene's folder"):
         import_scene(tmp_path / "a.gltf", "test", LIGHT)
+
+
+def test_a_file_without_faults_says_why_nothing_is_shown() -> None:
+    no_meshes, no_node, flat = Glb().quad(), Glb().quad(), Glb()
+    del no_meshes.document["meshes"]
+    no_meshes.document["nodes"] = [{}]
+    no_node.document["nodes"] = [{}]
+    flat.quad()
+    flat.document["nodes"][0]["scale"] = [1, 0, 0]
+    cases = {"the file has no meshes": no_meshes, "no node of the scene shows a mesh": no_node}
+    flat_fault = "Skipped mesh “quad”: its scale is zero or it is too large."
+    for contents, glb in (*cases.items(), (flat_fault, flat)):
+        with pytest.raises(SceneError, match=re.escape(f"made of triangles ({contents})")):
+            import_gltf(glb.bytes(), "test", LIGHT)

@@ -131,7 +131,7 @@ class _SceneBuilder:
         if len(self.meshes) > _MAX_SEPARATE_MESHES:
             self.meshes = merge_by_material(self.meshes)
         if not self.meshes:
-            raise SceneError(no_triangles(self.warnings))
+            raise SceneError(no_triangles(self.warnings, self._contents()))
         emissions = [np.array(read_material.emission) for read_material in self.materials]
         scene_materials = [read_material.material for read_material in self.materials]
         lit = self._collector.emissive_light(scene_materials, emissions, self.meshes)
@@ -143,6 +143,13 @@ class _SceneBuilder:
         warn_unknown_extensions(self._document, self.warnings)
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
+
+    def _contents(self) -> str:
+        """What a file has that shows nothing."""
+        if not len(self._document.meshes):
+            return "the file has no meshes"
+        shown = any(placed.node.mesh is not None and placed.is_visible for placed in self._nodes)
+        return "its triangles have no area" if shown else "no node of the scene shows a mesh"
 
     def _list_primitives(self) -> None:
         """Group the primitives of visible nodes by material and its variants."""

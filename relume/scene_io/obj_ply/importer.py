@@ -88,7 +88,7 @@ class _Builder:
     def scene(self, name: str, environment: Environment | None, origin: F64) -> Scene:
         """The finished scene. Raises SceneError with all faults if there is nothing to show."""
         if not self.meshes:
-            raise SceneError(no_triangles(self.warnings))
+            raise SceneError(no_triangles(self.warnings, "the file has no faces with an area"))
         self.maker.warn_gloss()
         collector = LightCollector(self.warnings)
         materials = collector.emissive_light(self.materials, self.emissions, self.meshes)

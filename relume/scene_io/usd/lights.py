@@ -228,14 +228,18 @@ class UsdLightReader:
         emitted, name = radiance(prim, self._time), prim.GetName()[:80] or "dome"
         path = prim.GetAttribute("inputs:texture:file").Get(self._time)
         data = self._images.files.read(path.path, label) if path and path.path else None
+        projection = prim.GetAttribute("inputs:texture:format").Get(self._time)
         uniform = Environment(name, np.ones((*UNIFORM_SIZE, 3), np.float32))
         try:
-            image = uniform if data is None else read_environment(data, name)
+            is_ball = projection == "mirroredBall"
+            image = uniform if data is None else read_environment(data, name, is_mirror_ball=is_ball)
         except SceneError as error:
             self._warnings.append(unsupported(f"The texture of {label} was skipped: {error}."))
             image = uniform
-        if prim.GetAttribute("inputs:texture:format").Get(self._time) not in (None, "automatic", "latlong"):
-            self._warnings.append(unsupported(f"The texture of {label} is read as equirectangular."))
+        if projection not in (None, "automatic", "latlong", "angular", "mirroredBall"):
+            self._warnings.append(
+                unsupported(f"The texture of {label} is read by its shape, not as {quote(projection)}.")
+            )
         pixels = image.radiance if image is uniform else _rotate(image.radiance, to_world[:3, :3] @ self._pole(prim))
         pixels = np.minimum(pixels * emitted.astype(np.float32), np.float32(_MAX_RADIANCE))
         if pixels.any():

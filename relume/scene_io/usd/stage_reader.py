@@ -140,11 +140,11 @@ class _StageReader:
         self._visit(self._stage.GetPseudoRoot(), root, self._transforms.GetLocalToWorldTransform, 0)
         self._warn_stage()
         if not self._shapes:
-            raise SceneError(no_triangles(self._warnings))
+            raise SceneError(no_triangles(self._warnings, "the stage shows no mesh or shape"))
         origin = self._recenter()
         materials, meshes = self._materials_and_meshes(meters, origin)
         if not meshes:
-            raise SceneError(no_triangles(self._warnings))
+            raise SceneError(no_triangles(self._warnings, "its triangles have no area"))
         if len(meshes) > _MAX_SEPARATE_MESHES:
             meshes = merge_by_material(meshes)
         collector = LightCollector(self._warnings)
