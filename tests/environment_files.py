@@ -11,7 +11,7 @@ def dusk():
 
 
 def write_map(path, pixels, chromaticities=None, **attributes):
-    """Write an equirectangular image in the format of the file name; `chromaticities`: 8 numbers; further attributes."""
+    """Write an equirectangular image in the format of the file name; `chromaticities`: 8 numbers."""
     height, width, channels = pixels.shape
     output = OpenImageIO.ImageOutput.create(str(path))
     spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)

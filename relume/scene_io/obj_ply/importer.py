@@ -31,7 +31,7 @@ from relume.scene_io.obj_ply.polygons import CutPolygons, triangulate
 from relume.scene_io.obj_ply.stl import read_stl
 from relume.scene_io.obj_ply.text import counted
 from relume.scene_io.obj_ply.weld import Corners, make_mesh, used_rows
-from relume.scene_io.placement import choose_origin, moved_warning
+from relume.scene_io.origin import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
 from relume.scene_io.surfaces.uv_transforms import UvSlot
 

@@ -29,7 +29,8 @@ from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.gltf.degenerate_transforms import cofactors, determinant
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply.weld import Corners, make_mesh
-from relume.scene_io.placement import TO_Y_UP, choose_origin, moved_warning
+from relume.scene_io.origin import choose_origin, moved_warning
+from relume.scene_io.placement import TO_Y_UP
 from relume.scene_io.referenced_files import Companions, NoFiles
 from relume.scene_io.surfaces.surface_images import SurfaceImages
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
