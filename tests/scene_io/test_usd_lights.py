@@ -59,7 +59,7 @@ def test_distant_lights_have_their_irradiance(inputs: str, expected: float) -> N
 
 
 @pytest.mark.parametrize(("author", "factor"), [("Blender v5.0.1", 4), ("Blender v4.1.0", 1), ("Houdini", 1)])
-def test_suns_of_blender_have_their_irradiance(author: str, factor: float) -> None:
+def test_distant_lights_of_blender_have_their_irradiance(author: str, factor: float) -> None:
     """Blender 5 writes a sun of 3 W/m² as 0.75."""
     scene = lit("DistantLight", "float inputs:intensity = 0.75\nbool inputs:normalize = 1", f'doc = "{author}"')
     assert fields(scene)["emission"] == pytest.approx([0.75 * factor] * 3)
