@@ -50,12 +50,13 @@ def pose_nodes(document: Document, time: float, accessors: AccessorReader, warni
         except SceneError as problem:
             warnings.append(unsupported(f"Objects aren't moved by {label}: {problem}."))
             continue
-        targets = {(channel.target.node, channel.target.path) for channel in animation.channels}
+        channels = ((channel.target.node, channel.target.path) for channel in animation.channels)
+        targets = {(node, path) for node, path in channels if node is not None}
         earlier = next((moved[target] for target in sorted(targets & moved.keys())), None)
         if earlier is not None:
             warnings.append(ignored(f"Objects aren't moved by {label}: {earlier} moves the same ones."))
             continue
-        moved |= {target: label for target in targets if target[0] is not None}
+        moved |= dict.fromkeys(targets, label)
         pose = _Pose(document, animation, label, accessors, warnings)
         pose.set(time)
         shown.append(label)

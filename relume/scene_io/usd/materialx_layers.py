@@ -92,13 +92,12 @@ class _NodeWriter:
             if source is not None:
                 usd_input.ConnectToSource(self.write(source[0], parent, source[1], depth + 1))
                 return
-            value = port.text() if kind in ("string", "filename") else port.numbers()
+            value: Any = port.text() if kind in ("string", "filename") else port.numbers()
         except UnsupportedNodeError:
             usd_input.GetAttr().AddConnection(f"{parent}/missing.outputs:out")  # the reader of the stage warns of it
             return
-        dimension = usd_input.GetTypeName().type.pythonClass
         if isinstance(value, tuple):
-            if len(value) != getattr(dimension, "dimension", 1):
+            if len(value) != getattr(usd_input.GetTypeName().type.pythonClass, "dimension", 1):
                 return
             value = value[0] if len(value) == 1 else value
         usd_input.Set(value)

@@ -68,7 +68,8 @@ export function mergeFiles(current: readonly DroppedFile[], added: readonly Drop
 async function findStageMaps(files: readonly DroppedFile[]): Promise<(file: DroppedFile) => boolean> {
   const layers = files.filter(isLayer);
   const texts = await Promise.all(layers.map(({ file }) => file.slice(0, MAX_LAYER_BYTES).text()));
-  return ({ path, file }) => layers.length > 0 && (path.includes("/") || texts.some((text) => text.includes(file.name)));
+  return ({ path, file }) =>
+    layers.length > 0 && (path.includes("/") || texts.some((text) => text.includes(file.name)));
 }
 
 export async function sortFiles(files: readonly DroppedFile[]): Promise<ImportSelection> {
