@@ -418,6 +418,18 @@ def test_a_materialx_network_precedes_the_surface_for_other_renderers() -> None:
     assert scene.materials[0].terms == only(CASES["metal"][0]).terms
 
 
+def test_a_materialx_network_has_the_alpha_test_of_the_other_surface() -> None:
+    inputs = "float inputs:geometry_opacity.connect = </Paint/Alpha.outputs:out>"
+    alpha = node("Alpha", "image_float", "asset inputs:file = @a.png@", "float")
+    body = network("ND_open_pbr_surface_surfaceshader", inputs, alpha)
+    plain = "color3f inputs:diffuseColor = (.8, .8, .8)"
+    for threshold, cutoff in ((0.0, None), (0.25, 0.25)):
+        layer = usda(body.replace(plain, f"{plain}\nfloat inputs:opacityThreshold = {threshold}"))
+        opacity = imported(layer, Files({"a.png": CHECKER})).materials[0].opacity
+        assert opacity is not None
+        assert opacity.cutoff == cutoff
+
+
 def test_a_network_that_is_not_supported_shows_the_other_surface_with_a_warning() -> None:
     scene = imported(usda(network("ND_surface", "float inputs:opacity = 1")))
     assert scene.materials[0].terms == only("color3f inputs:diffuseColor = (.8, .8, .8)").terms
