@@ -29,15 +29,27 @@ test("a format is either importable, and named in messages, or unsupported", () 
   expect(SCENE_SUFFIXES.filter((suffix) => !named(suffix))).toEqual([]);
 });
 
-test("a USD layer takes along all layers and images", async () => {
-  const files = [
-    dropped("kit/car.usda"),
-    dropped("kit/parts/wheel.usdc"),
-    dropped("kit/red.png"),
-    dropped("kit/a.bin"),
-  ];
-  const [car] = (await sortFiles(files)).scenes;
-  expect(car?.companions.map(({ path }) => path)).toEqual(["kit/parts/wheel.usdc", "kit/red.png"]);
+test("a USD layer takes along everything that a stage may name", async () => {
+  const names = ["kit/parts/wheel.usdc", "kit/red.png", "kit/paint.mtlx", "kit/seat.usdz", "kit/maps/sky.exr"];
+  const files = [dropped("kit/car.usda"), ...names.map((name) => dropped(name)), dropped("kit/a.bin")];
+  const { scenes, environment } = await sortFiles(files);
+  const car = scenes.find(({ path }) => path === "kit/car.usda");
+  expect(car?.companions.map(({ path }) => path)).toEqual(names);
+  expect(environment).toBeNull();
+});
+
+test("a map beside a USD layer is the environment unless the layer names it", async () => {
+  const named = await sortFiles([dropped("a.usda", "asset inputs:texture:file = @./sky.exr@"), dropped("sky.exr")]);
+  expect(named.environment).toBeNull();
+  const other = await sortFiles([dropped("a.usda", "no map"), dropped("studio.hdr")]);
+  expect(other.environment?.name).toBe("studio.hdr");
+});
+
+test("MaterialX documents need a USD layer, dropped with them or before", () => {
+  const document = dropped("paint.mtlx");
+  expect(startPageRejection([document])).toContain("drop materials on the Library");
+  expect(startPageRejection([document, dropped("car.usdc")])).toBeNull();
+  expect(startPageRejection([document], [dropped("car.usdc")])).toBeNull();
 });
 
 test("a scene takes along what it names, wherever that lies in the folder, and no more", async () => {

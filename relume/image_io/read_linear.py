@@ -14,13 +14,14 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.image_io.color_channels import ColorChannels, find_color_channels
 from relume.image_io.open_image import check_claim, clear_error, open_image
-from relume.image_io.primaries import convert, declared_primaries
+from relume.image_io.primaries import INTEROP_SPACES, convert, declared_primaries
 
 F32 = NDArray[np.float32]
 
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 CheckSize = Callable[[int, int], None]
 ChooseRows = Callable[[int, int], int]
+_NO_SPACE = ("", "unknown", "data")
 _MAX_HALF, _MAX_FLOAT = 65_504.0, 1e30  # conversion of primaries keeps the latter finite
 
 
@@ -80,9 +81,8 @@ class LinearReader:
             _check_claims(channels, self._data, self._label)
             self.warnings += _layer_warnings(channels)
             self.is_openexr_cube = spec.get_string_attribute("textureformat") == "CubeFace Environment"
-            chromaticities = spec.getattribute("chromaticities")
-            if chromaticities is not None and len(channels.indices) == 3:  # gray has no primaries
-                matrix, warnings = declared_primaries(chromaticities)
+            if len(channels.indices) == 3:  # gray has no primaries
+                matrix, warnings = _primaries(spec)
                 self.warnings += warnings
             limit = _MAX_HALF if str(spec.channelformat(channels.indices[0])) == "half" else _MAX_FLOAT
             blocks = _BlockReader(image, channels, is_sequential=self._suffix == ".hdr")
@@ -200,6 +200,16 @@ def _check_claims(channels: ColorChannels, data: bytes, label: str) -> None:
         if 8 * num_tiles > len(data):  # each has 8 bytes in a table
             raise SceneError(f"{label} has more tiles than data; it is damaged, export it again")
     check_claim(_block_rows(spec) * (spec.tile_width or spec.width) * spec.nchannels * 4, data, label)
+
+
+def _primaries(spec: oiio.ImageSpec) -> tuple[Shaped[NDArray[np.float64], "3 3"] | None, list[ImporterWarning]]:
+    """The declared primaries of a file, by numbers or by the name of a color space; see `declared_primaries`."""
+    chromaticities, space = spec.getattribute("chromaticities"), spec.get_string_attribute("colorInteropID")
+    if chromaticities is None and space not in _NO_SPACE:
+        if space not in INTEROP_SPACES:
+            return None, [unsupported(f"has the color space {quote(space)}; it was read as linear Rec. 709.")]
+        chromaticities = INTEROP_SPACES[space]
+    return (None, []) if chromaticities is None else declared_primaries(chromaticities)
 
 
 def _layer_warnings(channels: ColorChannels) -> Iterator[ImporterWarning]:

@@ -52,10 +52,14 @@ def sort_warnings(warnings: Sequence[ImporterWarning]) -> list[ImporterWarning]:
     return sorted_warnings
 
 
-def no_triangles(warnings: Sequence[ImporterWarning]) -> str:
-    """Why there is nothing to show, with the faults of the file."""
+def no_triangles(warnings: Sequence[ImporterWarning], contents: str) -> str:
+    """Why there is nothing to show, with the faults of the file.
+
+    Args:
+        warnings: of the import. contents: of a file without faults, as a clause.
+    """
     faults = "; ".join(dict.fromkeys(str(warning) for warning in warnings if warning.severity == "unsupported"))
     message = "the scene has no triangles with an area; export at least one mesh made of triangles"
-    message += f" ({faults})" if faults else ""
+    message += f" ({faults or contents})"
     message = "".join(character if character.isprintable() else " " for character in message)
     return message if len(message) <= MAX_REFUSAL else f"{message[: MAX_REFUSAL - 1]}…"

@@ -11,14 +11,15 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, by_severity, ignored
+from relume.core.import_warnings import ImporterWarning, approximated, by_severity
 from relume.math.bounding_box import bounding_box
 from relume.scene.collect_lights import mesh_area
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.gltf.geometry import MAX_COORDINATE
-from relume.scene_io.import_options import ImportOptions, Recenter
+from relume.scene_io.import_options import ImportOptions
+from relume.scene_io.origin import choose_origin, moved_warning
 
 F64 = NDArray[np.float64]
 TO_Y_UP = {
@@ -29,7 +30,6 @@ TO_Y_UP = {
 }
 """Rotations to +Y up; +X stays."""
 METERS = {"file": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-FAR = 100.0  # of its size from the origin: float32 rounds positions to 6 millionths of the size
 LARGE = 100.0  # meters: a scene whose longest side is larger was not modeled in the unit that was tried
 
 
@@ -140,22 +140,3 @@ def _place_glass(fields: Mapping[str, Any], meters: float) -> dict[str, Any]:
     if not glass or "absorption" not in glass:
         return dict(fields)
     return {**fields, "glass": {**glass, "absorption": [rate / meters for rate in glass["absorption"]]}}
-
-
-def choose_origin(low: Shaped[F64, " 3"], high: Shaped[F64, " 3"], recenter: Recenter) -> Shaped[F64, " 3"]:
-    """Return the new origin of positions, in the coordinates of the file: the middle of the scene, or zero.
-
-    Args:
-        low, high: bounding box of the scene. recenter: see `ImportOptions`.
-    """
-    is_far = float(np.maximum(np.abs(low), np.abs(high)).max()) > FAR * float(np.linalg.norm(high - low))
-    return (low + high) / 2 if recenter == "always" or (recenter == "auto" and is_far) else np.zeros(3)
-
-
-def moved_warning(origin: Shaped[F64, " 3"]) -> list[ImporterWarning]:
-    """A warning about a new origin, in the coordinates of the file; none if it is zero."""
-    if not origin.any():
-        return []
-    x, y, z = (f"{value:,.10g}" for value in origin)
-    message = f"Positions are relative to ({x}; {y}; {z}) of the file: the middle of the scene."
-    return [ignored(message)]

@@ -7,6 +7,7 @@ import re
 import unicodedata
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 from urllib.parse import unquote
@@ -16,6 +17,7 @@ from relume.core.import_warnings import UNREADABLE
 
 ABSOLUTE = re.compile(r"[A-Za-z]:|[A-Za-z][\w+.-]*:/|:")
 """Start of a path with a drive letter, or of a URL; a colon elsewhere is part of a name."""
+_UTF_8_FLAG = 0x800  # of names in .zip files
 MAX_BYTES = 512 << 20  # of all companions of a scene
 Entry = TypeVar("Entry")
 
@@ -165,7 +167,7 @@ class Archive(NamedFiles[zipfile.ZipInfo]):
     """The other entries of a .zip file, read in memory without extracting them."""
 
     def __init__(self, archive: zipfile.ZipFile, folder: str) -> None:
-        entries = {info.filename: info for info in archive.infolist()}
+        entries = {entry_name(info): info for info in archive.infolist()}
         super().__init__(entries, folder, lambda entry: read_entry(archive, entry))
 
 
@@ -183,6 +185,14 @@ class UploadedFiles(NamedFiles[Path]):
         if sum(path.stat().st_size for path in files.values()) > MAX_BYTES:
             raise SceneError(f"the files next to the scene have over {MAX_BYTES >> 20} MB; scale them down")
         super().__init__(files, posixpath.dirname(scene.replace("\\", "/")), Path.read_bytes)
+
+
+def entry_name(entry: zipfile.ZipInfo) -> str:
+    """Name of an entry: UTF-8 also where the archive doesn't say so, as those of USD and macOS, else code page 437."""
+    if not entry.flag_bits & _UTF_8_FLAG:
+        with suppress(UnicodeError):
+            return entry.filename.encode("cp437").decode("utf-8")
+    return entry.filename
 
 
 def read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:

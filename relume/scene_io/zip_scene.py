@@ -8,7 +8,7 @@ import zipfile
 
 from relume.archives.bounded import LongDirectoryError, open_bounded
 from relume.core.errors import SceneError
-from relume.scene_io.referenced_files import MAX_BYTES, Archive, read_entry
+from relume.scene_io.referenced_files import MAX_BYTES, Archive, entry_name, read_entry
 from relume.scene_io.root_layer import find_roots
 
 MAX_ENTRIES = 1_000
@@ -44,7 +44,7 @@ def open_zip(
     document = read_entry(archive, scene)
     if opens_packages and scene.filename.lower().endswith(".usdz"):
         return open_zip(document, opens_packages=False)
-    return document, Archive(archive, posixpath.dirname(scene.filename.replace("\\", "/")))
+    return document, Archive(archive, posixpath.dirname(entry_name(scene).replace("\\", "/")))
 
 
 def _find_document(
@@ -68,14 +68,14 @@ def _find_root_layer(layers: list[zipfile.ZipInfo], archive: zipfile.ZipFile) ->
     """The layer that no other layer names; of several, the only one in the uppermost folder."""
     if len(layers) == 1:
         return layers[0]
-    roots = find_roots({entry.filename: read_entry(archive, entry) for entry in layers})
+    roots = find_roots({entry_name(entry): read_entry(archive, entry) for entry in layers})
     depth = min((name.count("/") for name in roots), default=0)
     upper = [name for name in roots if name.count("/") == depth]
     if len(upper) != 1:
         listed = ", ".join(sorted(upper)[:5])
         message = f"the .zip file contains {len(upper)} USD scenes side by side ({listed}); leave one of them"
         raise SceneError(f"{message}, or pack it as .usdz")
-    return next(entry for entry in layers if entry.filename == upper[0])
+    return next(entry for entry in layers if entry_name(entry) == upper[0])
 
 
 def _is_usdz(data: bytes, first: zipfile.ZipInfo) -> bool:

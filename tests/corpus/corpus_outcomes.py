@@ -130,13 +130,14 @@ _READERS: dict[str, Callable[[Path, Folder], Iterable[str]]] = {
 
 
 def peer_reads(path: Path) -> bool:
-    """True if trimesh reads triangles from a scene file."""
+    """True if trimesh reads triangles with an area from a scene file."""
     import trimesh
 
     try:
         with _limited(PEER_SECONDS):
             scene = trimesh.load_scene(path)
-            return sum(len(mesh.faces) for mesh in scene.geometry.values() if hasattr(mesh, "faces")) > 0
+            areas = [mesh.area_faces for mesh in scene.geometry.values() if hasattr(mesh, "faces")]
+            return any((np.isfinite(area) & (area > 0)).any() for area in areas)
     except Exception:  # a peer raises all kinds
         return False
 

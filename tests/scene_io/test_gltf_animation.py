@@ -116,18 +116,37 @@ def test_joints_move_their_vertices() -> None:
     np.testing.assert_allclose(offset(at(glb, 0.25)), [0, 1, 0], atol=1e-6)
 
 
-def test_the_first_of_several_animations_is_shown_and_said() -> None:
+def test_the_first_animation_of_a_property_is_shown_and_others_are_named() -> None:
     glb = animated("translation", [[0, 0, 1]], times=[0])
     glb.document["animations"][0]["name"] = "Walk"
     with_animation(glb, "translation", [[0, 0, 5]], "STEP", [0], name="Run")
     scene = at(glb, 2)
     assert offset(scene)[2] == 1
-    (warning,) = scene.warnings
-    assert warning == (
-        "Objects are shown at 2 s of animation “Walk”, which lasts from 0 to 0 s, not of animation “Run”."
-    )
+    assert [str(warning) for warning in scene.warnings] == [
+        "Objects aren't moved by animation “Run”: animation “Walk” moves the same ones.",
+        "Objects are shown at 2 s of animation “Walk”, which lasts from 0 to 0 s.",
+    ]
     (warning,) = at(glb, None).warnings
     assert warning == "2 animations were ignored: objects are shown in their rest pose."
+
+
+def test_animations_of_different_objects_apply_together() -> None:
+    """One animation for each object, as Blender writes them; one with nothing new, of both, is left out as a whole."""
+    glb = animated("translation", [[0, 0, 0], [0, 0, 2]], times=[0, 1])
+    glb.document["nodes"].append({"mesh": 0})
+    glb.document["scenes"][0]["nodes"] = [0, 1]
+    with_animation(glb, "translation", [[0, 0, 0], [0, 4, 0]], "LINEAR", [0, 2])
+    glb.document["animations"][1]["channels"][0]["target"]["node"] = 1
+    with_animation(glb, "scale", [[1, 1, 1], [3, 3, 3]], "LINEAR", [0, 1])
+    with_animation(glb, "scale", [[9, 9, 9]], "STEP", [0])
+    glb.document["animations"][3]["channels"].append({"sampler": 0, "target": {"node": 1, "path": "scale"}})
+    first, second = at(glb, 0.5).meshes
+    np.testing.assert_allclose(first.positions, 2 * QUAD + [0, 0, 1], atol=1e-6)
+    np.testing.assert_allclose(second.positions, np.add(QUAD, [0, 1, 0]), atol=1e-6)
+    assert [str(warning) for warning in at(glb, 5).warnings] == [
+        "Objects aren't moved by animation 3: animation 2 moves the same ones.",
+        "Objects are shown at 5 s of animation 0, animation 1, animation 2, which lasts from 0 to 2 s.",
+    ]
 
 
 def test_a_time_without_an_animation_is_said() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import zipfile
 from pathlib import Path
@@ -246,7 +247,8 @@ def test_an_unreadable_normal_map_leaves_the_other_images() -> None:
 def test_deep_trees_are_shown() -> None:
     glb = Glb().quad()
     glb.document["nodes"] = [{"children": [k + 1], "translation": [0, 0, 1]} for k in range(500)] + [{"mesh": 0}]
-    np.testing.assert_allclose(imported(glb).meshes[0].positions, QUAD + np.array([0, 0, 500]))
+    scene = imported(glb)
+    np.testing.assert_allclose(scene.meshes[0].positions + scene.offset, QUAD + np.array([0, 0, 500]))
 
 
 def test_nodes_that_cannot_be_placed_are_left_out() -> None:
@@ -377,3 +379,44 @@ def test_names_outside_the_folder_are_not_opened(tmp_path: Path, name: str) -> N
     (tmp_path / "a.gltf").write_bytes(document)
     with pytest.raises(SceneError, match="outside the scene's folder"):
         import_scene(tmp_path / "a.gltf", "test", LIGHT)
+
+
+def test_a_file_without_faults_says_why_nothing_is_shown() -> None:
+    no_meshes, no_node, flat = Glb().quad(), Glb().quad(), Glb()
+    del no_meshes.document["meshes"]
+    no_meshes.document["nodes"] = [{}]
+    no_node.document["nodes"] = [{}]
+    flat.quad()
+    flat.document["nodes"][0]["scale"] = [1, 0, 0]
+    cases = {"the file has no meshes": no_meshes, "no node of the scene shows a mesh": no_node}
+    flat_fault = "Skipped mesh “quad”: its scale is zero or it is too large."
+    for contents, glb in (*cases.items(), (flat_fault, flat)):
+        with pytest.raises(SceneError, match=re.escape(f"made of triangles ({contents})")):
+            import_gltf(glb.bytes(), "test", LIGHT)
+
+
+def test_far_nodes_keep_their_shape_with_cameras_and_lights() -> None:
+    """Near 6,378 km single precision has steps of half a meter; the quads are 0.2 m wide and 1 m apart."""
+    far = np.array([6_378_137.3, 0.25, -4_500_000.7])
+    glb = Glb().quad()
+    glb.document |= {
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.5}}],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 6830}]}},
+        "nodes": [
+            {"mesh": 0, "translation": far.tolist(), "scale": [0.2] * 3},
+            {"mesh": 0, "translation": np.add(far, [1, 0, 0]).tolist(), "scale": [0.2] * 3},
+            {"camera": 0, "translation": np.add(far, [0, 0, 3]).tolist()},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": np.add(far, [0, 2, 0]).tolist()},
+        ],
+        "scenes": [{"nodes": [0, 1, 2, 3]}],
+    }
+    scene = imported(glb)
+    np.testing.assert_allclose(scene.offset, np.add(far, [0.6, 0.1, 0]), atol=1e-8)
+    first, second = (mesh.positions for mesh in scene.meshes)
+    np.testing.assert_allclose(first, 0.2 * QUAD - [0.6, 0.1, 0], atol=1e-6)
+    np.testing.assert_allclose(second - first, [[1, 0, 0]] * 4, atol=1e-6)
+    np.testing.assert_allclose(scene.cameras[0].to_world[:3, 3], [-0.6, -0.1, 3], atol=1e-6)
+    np.testing.assert_allclose(scene.lights[0].fields["position"], [-0.6, 1.9, 0], atol=1e-6)
+    assert sum("Positions are relative to" in warning for warning in scene.warnings) == 1
+    fixed = import_gltf(glb.bytes(), "test", LIGHT, options=ImportOptions(recenter="never"))
+    assert fixed.offset == (0, 0, 0)

@@ -35,8 +35,9 @@ def skinned(joints: list[dict[str, Any]], weights: np.ndarray = FIRST, inverse: 
 
 
 def test_vertices_follow_their_joint_and_not_their_node() -> None:
-    (mesh,) = imported(skinned([{"scale": [0.01] * 3, "translation": [0, 5, 0]}], inverse=np.eye(4)[None])).meshes
-    np.testing.assert_allclose(mesh.positions, QUAD * 0.01 + [0, 5, 0], atol=1e-6)
+    scene = imported(skinned([{"scale": [0.01] * 3, "translation": [0, 5, 0]}], inverse=np.eye(4)[None]))
+    (mesh,) = scene.meshes
+    np.testing.assert_allclose(mesh.positions + scene.offset, QUAD * 0.01 + [0, 5, 0], atol=1e-6)
     np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * 4, atol=1e-6)
 
 

@@ -90,11 +90,23 @@ def test_open_pbr_dielectric_with_a_tinted_coat() -> None:
     assert diffuse["color"] == pytest.approx(np.array([0.05, 0.15, 0.225]) * (1 - mean), abs=1e-5)
     assert highlight["params"]["f0"] == pytest.approx([f0, f0 / 2, f0 / 2], abs=1e-5)
     assert highlight["params"]["roughness"] == 0.25
-    assert coat["params"] == {"roughness": 0.02, "f0": F0}
+    assert coat["params"] == {"roughness": 0.02, "f0": pytest.approx(f0, abs=1e-6)}  # 1.6 is the coat's default, too
     assert warnings == [
-        "The coat of material “M” is approximated: its index of refraction 1.6 is shown as 1.5, it doesn't darken the "
-        "base, it is tinted the same from all sides."
+        "The coat of material “M” is approximated: it doesn't darken the base, it is tinted the same from all sides."
     ]
+
+
+@pytest.mark.parametrize(
+    ("category", "weight", "ior"),
+    [("open_pbr_surface", "coat_weight", "coat_ior"), ("standard_surface", "coat", "coat_IOR")],
+)
+def test_coats_have_their_index_of_refraction(category: str, weight: str, ior: str) -> None:
+    """((n − 1) / (n + 1))² at normal incidence; no dielectric has 9, and the model's default is taken."""
+    for value, n in ((2.0, 2.0), (9.0, {"coat_ior": 1.6, "coat_IOR": 1.5}[ior])):
+        material, warnings = only(surface(category, number(weight, 1) + number(ior, value)))
+        coat = material.material.terms[-1]
+        assert coat["params"]["f0"] == pytest.approx(((n - 1) / (n + 1)) ** 2, abs=1e-6)
+        assert any("index of refraction of the coat 9" in warning for warning in warnings) == (value == 9)
 
 
 def test_open_pbr_metal_is_anisotropic_by_its_formula() -> None:

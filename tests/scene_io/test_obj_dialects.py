@@ -122,6 +122,7 @@ def test_the_name_of_a_library_may_have_spaces(name: str, tmp_path: Path) -> Non
         ("-bm .5 tex.png -clamp on", MtlMap("tex.png", strength=0.5, clamp=True)),
         ("-imfchan m -s 2 2 2.png", MtlMap("2.png", scale=(2, 2), channel="m")),
         ("-colorspace sRGB tex.png", MtlMap("tex.png")),
+        ("-S 2 3 1 -O .5 TEX.png -CLAMP ON", MtlMap("TEX.png", scale=(2, 3), offset=(0.5, 0), clamp=True)),
         ("-blendu on -texres 512 -boost 1.2 -cc off -mm 0 1 -t 0 0 0 tex.png", MtlMap("tex.png")),
         ("-mm 0.1 0.5 -t 1 tex.png", MtlMap("tex.png", ignored_options=("-mm", "-t"))),
         ('"my tex.png"', MtlMap("my tex.png")),

@@ -155,6 +155,24 @@ def test_packages_show_their_first_layer_with_their_images() -> None:
         assert scene.warnings == ()
 
 
+@pytest.mark.parametrize("folder", ["", "größe/"])
+def test_names_in_archives_are_utf_8_where_the_archive_does_not_say_so(folder: str) -> None:
+    """USD and macOS write UTF-8 names without the flag that says so."""
+    files = {
+        f"{folder}main.usda": usda(painted(RGB, texture("Image", "Farbmuster é.png"))),
+        f"{folder}Farbmuster é.png": CHECKER,
+    }
+    data = bytearray(zipped(files) if folder else usdz(files))
+    for signature, flags in ((b"PK\3\4", 7), (b"PK\1\2", 9)):
+        position = data.find(signature)
+        while position >= 0:
+            data[position + flags] &= ~0x08
+            position = data.find(signature, position + 4)
+    scene = import_scene(bytes(data), "test", WHITE)
+    assert scene.warnings == ()
+    assert "diffuse" in scene.materials[0].textures
+
+
 def test_packages_are_referenced_as_a_whole_or_for_one_of_their_layers() -> None:
     package = usdz({"main.usda": chair(), "other.usda": chair().replace(b"Seat", b"Back")})
     body = REFERENCE % "@chair.usdz@" + (REFERENCE % "@chair.usdz[other.usda]@").replace("Root", "Second")

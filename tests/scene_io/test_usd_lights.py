@@ -58,6 +58,14 @@ def test_distant_lights_have_their_irradiance(inputs: str, expected: float) -> N
     np.testing.assert_allclose(light["emission"], np.array([1, 0.5, 0]) * expected, rtol=1e-5)
 
 
+@pytest.mark.parametrize(("author", "factor"), [("Blender v5.0.1", 4), ("Blender v4.1.0", 1), ("Houdini", 1)])
+def test_distant_lights_of_blender_have_their_irradiance(author: str, factor: float) -> None:
+    """Blender 5 writes a sun of 3 W/m² as 0.75."""
+    scene = lit("DistantLight", "float inputs:intensity = 0.75\nbool inputs:normalize = 1", f'doc = "{author}"')
+    assert fields(scene)["emission"] == pytest.approx([0.75 * factor] * 3)
+    assert any("4 times as bright as in the file" in warning for warning in scene.warnings) == (factor == 4)
+
+
 @pytest.mark.parametrize(
     ("normalize", "metadata", "radiance"),
     [(0, "", 5), (1, "", 5 / 6), (0, "metersPerUnit = 0.1", 5), (1, "metersPerUnit = 0.1", 5 / 6)],
@@ -190,6 +198,25 @@ def test_domes_turn_with_their_prim_and_with_the_up_axis(tmp_path: Path) -> None
     np.testing.assert_allclose(
         lookup(z_up.environment.radiance, directions([0, 1, 0], [0, 0, 1])), [[0, 0, 1], [1, 0, 0]], atol=0.05
     )
+
+
+@pytest.mark.parametrize(
+    ("projection", "read_as"),
+    [("mirroredBall", "a mirror ball"), ("angular", "an angular map"), ("cubeMap", "an angular map")],
+)
+def test_domes_may_have_the_projection_of_light_probes(tmp_path: Path, projection: str, read_as: str) -> None:
+    """A disk that is white around its center and black at its rim."""
+    t = (np.arange(64) + 0.5) / 32 - 1
+    radius = np.hypot(*np.meshgrid(t, t))
+    write_map(tmp_path / "probe.exr", np.repeat((radius < 0.6)[..., None], 3, axis=2).astype(np.float32))
+    inputs = f'asset inputs:texture:file = @probe.exr@\ntoken inputs:texture:format = "{projection}"'
+    scene = dome_scene(inputs, {"probe.exr": (tmp_path / "probe.exr").read_bytes()})
+    white = 2 * np.arcsin(0.6) if projection == "mirroredBall" else 0.6 * np.pi  # angle from the front, +Z
+    angles = np.array([0, white - 0.15, white + 0.15, np.pi])
+    shown = lookup(scene.environment.radiance, directions(*np.stack([np.sin(angles), 0 * angles, np.cos(angles)], -1)))
+    np.testing.assert_allclose(shown[:, 0], [1, 1, 0, 0], atol=0.05)
+    assert any(f"read as {read_as}" in warning for warning in scene.warnings)
+    assert any("not as “cubeMap”" in warning for warning in scene.warnings) == (projection == "cubeMap")
 
 
 def test_domes_without_an_image_are_uniform_and_a_missing_one_is_said() -> None:

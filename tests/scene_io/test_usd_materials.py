@@ -374,11 +374,108 @@ def test_glass_of_materialx_is_a_solid_with_its_tint() -> None:
     assert volume.thickness == 0  # a quad has no depth
 
 
+def network(shader: str, inputs: str, nodes: str = "") -> str:
+    """A quad with a MaterialX network, and a gray placeholder for renderers that don't read it, as of Blender."""
+    paint = "</Paint/Shader.outputs:out>"
+    return (
+        quad(properties=f"{ST}\nrel material:binding = </Paint>", metadata=BOUND)
+        + f"""
+def Material "Paint" {{
+    token outputs:surface.connect = </Paint/Placeholder.outputs:out>
+    token outputs:mtlx:surface.connect = {paint}
+    def Shader "Placeholder" {{
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = (.8, .8, .8)
+        token outputs:out
+    }}
+    def Shader "Shader" {{
+        uniform token info:id = "{shader}"
+        {inputs}
+        token outputs:out
+    }}
+    {nodes}
+}}"""
+    )
+
+
+def node(name: str, category: str, inputs: str, kind: str = "float3") -> str:
+    return f"""def Shader "{name}" {{
+        uniform token info:id = "ND_{category}"
+        {inputs}
+        {kind} outputs:out
+    }}
+    """
+
+
+def test_a_materialx_network_precedes_the_surface_for_other_renderers() -> None:
+    inputs = "color3f inputs:base_color = (.9, .6, .2)\nfloat inputs:base_metalness = 1"
+    inputs += "\nfloat inputs:specular_roughness = .25\nfloat3 inputs:geometry_normal.connect = </Paint/N.outputs:out>"
+    inputs += "\nfloat3 inputs:geometry_tangent.connect = </Paint/T.outputs:out>"
+    nodes = node("N", "normal_vector3", 'string inputs:space = "world"') + node("T0", "tangent_vector3", "")
+    nodes += node("T", "normalize_vector3", "float3 inputs:in.connect = </Paint/T0.outputs:out>")
+    scene = imported(usda(network("ND_open_pbr_surface_surfaceshader", inputs, nodes)))
+    assert scene.warnings == ()
+    assert scene.materials[0].terms == only(CASES["metal"][0]).terms
+
+
+def test_a_materialx_network_has_the_alpha_test_of_the_other_surface() -> None:
+    inputs = "float inputs:geometry_opacity.connect = </Paint/Alpha.outputs:out>"
+    alpha = node("Alpha", "image_float", "asset inputs:file = @a.png@", "float")
+    body = network("ND_open_pbr_surface_surfaceshader", inputs, alpha)
+    plain = "color3f inputs:diffuseColor = (.8, .8, .8)"
+    for threshold, cutoff in ((0.0, None), (0.25, 0.25)):
+        layer = usda(body.replace(plain, f"{plain}\nfloat inputs:opacityThreshold = {threshold}"))
+        opacity = imported(layer, Files({"a.png": CHECKER})).materials[0].opacity
+        assert opacity is not None
+        assert opacity.cutoff == cutoff
+
+
+def test_a_network_that_is_not_supported_shows_the_other_surface_with_a_warning() -> None:
+    scene = imported(usda(network("ND_surface", "float inputs:opacity = 1")))
+    assert scene.materials[0].terms == only("color3f inputs:diffuseColor = (.8, .8, .8)").terms
+    (warning,) = scene.warnings
+    assert warning.severity == "unsupported"
+    assert "shown by its plain surface: its MaterialX shader “ND_surface” isn't supported" in warning
+
+
+def test_surface_vectors_as_colors_are_a_warning() -> None:
+    inputs = "color3f inputs:base_color.connect = </Paint/N.outputs:out>"
+    scene = imported(usda(network("ND_open_pbr_surface_surfaceshader", inputs, node("N", "normal_vector3", ""))))
+    assert any("base_color of material “Paint”" in warning for warning in scene.warnings)
+
+
+def test_texture_coordinates_of_math_nodes() -> None:
+    """u′ = R (S u) + t: S = (2, 3), R turns by 90° clockwise, as MaterialX has it, t = (¼, 0), v from the bottom."""
+    inputs = "color3f inputs:base_color.connect = </Paint/Color.outputs:out>"
+    steps = [
+        node("A", "convert_vector2_vector3", "float2 inputs:in.connect = </Paint/Uv.outputs:out>"),
+        node("B", "multiply_vector3", "float3 inputs:in1.connect = </Paint/A.outputs:out>"
+             "\nfloat3 inputs:in2 = (2, 3, 1)"),
+        node("C", "rotate3d_vector3", "float3 inputs:in.connect = </Paint/B.outputs:out>\nfloat inputs:amount = 0"
+             "\nfloat3 inputs:axis = (1, 0, 0)"),
+        node("D", "rotate3d_vector3", "float3 inputs:in.connect = </Paint/C.outputs:out>\nfloat inputs:amount = 90"
+             "\nfloat3 inputs:axis = (0, 0, 1)"),
+        node("E", "add_vector3", "float3 inputs:in1.connect = </Paint/D.outputs:out>\nfloat3 inputs:in2 = (.25, 0, 0)"),
+        node("F", "convert_vector3_vector2", "float3 inputs:in.connect = </Paint/E.outputs:out>", "float2"),
+        node("Uv", "texcoord_vector2", "", "float2"),
+        node("Color", "image_color3", "asset inputs:file = @c.png@"
+             "\nfloat2 inputs:texcoord.connect = </Paint/F.outputs:out>", "color3f"),
+    ]  # fmt: skip
+    scene = imported(
+        usda(network("ND_open_pbr_surface_surfaceshader", inputs, "".join(steps))), Files({"c.png": CHECKER})
+    )
+    assert scene.warnings == ()
+    upward = scene.meshes[0].uvs * (1, -1) + (0, 1)
+    corners = scene.meshes[0].positions[:, :2] / 2 + 0.5
+    expected = np.stack([0.25 + 3 * corners[:, 1], -2 * corners[:, 0]], axis=1)
+    np.testing.assert_allclose(upward, expected, atol=1e-5)
+
+
 def test_documents_with_entities_are_not_read() -> None:
     bomb = b'<!DOCTYPE x [<!ENTITY a "aaaa">]><materialx><surfacematerial name="&a;"/></materialx>'
     body = quad() + 'def Scope "Looks" (\n references = @paint.mtlx@</MaterialX/Materials>\n) {\n}'
     scene = imported(usda(body), Files({"paint.mtlx": bomb}))
-    assert any("Skipped “paint.mtlx”: it declares entities" in warning for warning in scene.warnings)
+    assert any("Skipped “paint.mtlx”: the .mtlx file defines entities" in warning for warning in scene.warnings)
     wide = imported(usda(body), Files({"paint.mtlx": bomb.decode().encode("utf-16")}))
     assert any("Skipped “paint.mtlx”: the .mtlx file defines entities" in warning for warning in wide.warnings)
 

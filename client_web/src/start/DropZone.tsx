@@ -81,13 +81,13 @@ export function DropZone({ onImported }: { onImported: (scenes: ImportedScene[])
   const { upload, problems, clearProblems, send } = useImport();
   const selection = useSortedFiles(files);
   const { scenes, environment } = selection;
-  const addFiles = (files: DroppedFile[]) => {
-    if (files.length === 0) return showError("This folder is empty.", "files");
+  const addFiles = (added: DroppedFile[]) => {
+    if (added.length === 0) return showError("This folder is empty.", "files");
     clearErrors("files"); // of earlier drops
-    const message = startPageRejection(files);
+    const message = startPageRejection(added, files);
     if (message !== null) showError(message, "files");
     clearProblems();
-    setFiles((current) => mergeFiles(current, files.filter(isImportable)));
+    setFiles((current) => mergeFiles(current, added.filter(isImportable)));
   };
   const clear = () => {
     clearErrors("files");

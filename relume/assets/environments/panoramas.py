@@ -10,7 +10,8 @@ is +Z. Faces of cubes show the view from inside. Their layouts are:
                                     back, turned by half a turn
 
 An angular map is the light probe of Debevec (1998): a disk with the front at its center, where the distance from the
-center is proportional to the angle, up to 180° at the edge.
+center is proportional to the angle θ from the front, up to 180° at the edge. In a mirror ball, which an orthographic
+camera faces, the distance is sin(θ / 2). Pixels do not tell one from the other.
 """
 
 from __future__ import annotations
@@ -93,6 +94,7 @@ _CUBE_LAYOUTS: Mapping[tuple[int, int], Sequence[_CubeLayout]] = {
 }
 """Layouts by columns and rows of cells."""
 
+ANGULAR_MAP = "an angular map"
 _MIN_ALMOST_HEIGHT, _MAX_ROWS_OFF = 64, 2
 _MAX_BLANK_RANGE = 0.01  # of unused texels, relative to the mean of all
 _MIN_BLANK_RADIUS = 1.04  # relative to the disk, whose edge may be smooth
@@ -106,7 +108,9 @@ def is_panorama_size(width: int, height: int) -> bool:
     return is_cube or width == height or _is_almost_equirectangular(width, height)
 
 
-def find_panorama(image: Shaped[F32, "height width 3"], is_openexr_cube: bool) -> Panorama | None:
+def find_panorama(
+    image: Shaped[F32, "height width 3"], *, is_openexr_cube: bool, is_mirror_ball: bool
+) -> Panorama | None:
     """Find the projection of an image that is not 2:1; None if it shows none.
 
     Six faces have two orders; the one whose neighboring faces agree better is taken. In crosses and disks the rest of
@@ -114,13 +118,15 @@ def find_panorama(image: Shaped[F32, "height width 3"], is_openexr_cube: bool) -
 
     Args:
         is_openexr_cube: the file says that it has cube faces in the order of OpenEXR.
+        is_mirror_ball: a disk is a mirror ball, not an angular map.
     """
     height, width, _ = image.shape
     if _is_almost_equirectangular(width, height):
         return Panorama("an equirectangular map", lookup, width // 2 * 2)
     if width == height:
         is_map = _is_blank(image, _radius(width) > _MIN_BLANK_RADIUS)
-        return Panorama("an angular map, not a mirror ball,", _look_up_angular, 2 * width) if is_map else None
+        name, radius = ("a mirror ball", _mirror_radius) if is_mirror_ball else (ANGULAR_MAP, _angular_radius)
+        return Panorama(name, partial(_look_up_disk, radius), 2 * width) if is_map else None
     columns, rows = next(ratio for ratio in _CUBE_LAYOUTS if width * ratio[1] == height * ratio[0])
     layouts = _CUBE_LAYOUTS[columns, rows]
     size = width // columns
@@ -170,10 +176,19 @@ def _radius(size: int) -> Shaped[F64, "size size"]:
     return np.hypot(x[:, None], x)
 
 
-def _look_up_angular(image: F32, directions: F32) -> F32:
+def _angular_radius(angle: F64) -> F64:
+    return np.asarray(angle / np.pi)
+
+
+def _mirror_radius(angle: F64) -> F64:
+    return np.asarray(np.sin(angle / 2))
+
+
+def _look_up_disk(radius_of: Callable[[F64], F64], image: F32, directions: F32) -> F32:
+    """Radiance of a disk. radius_of: distance from its center, from the angle to the front, radians"""
     size = len(image)
     forward, up, right = np.asarray(directions, np.float64).T
-    radius = np.minimum(np.arctan2(np.hypot(up, right), forward) / np.pi, 1 - 2 / size)
+    radius = np.minimum(radius_of(np.arctan2(np.hypot(up, right), forward)), 1 - 2 / size)
     azimuth = np.arctan2(up, right)
     x, y = 1 + radius * np.cos(azimuth), 1 - radius * np.sin(azimuth)
     return _bilinear(image, 0.5 * size * x, 0.5 * size * y, size)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
-from relume.assets.environments.panoramas import find_panorama, is_panorama_size, to_equirectangular
+from relume.assets.environments.panoramas import ANGULAR_MAP, find_panorama, is_panorama_size, to_equirectangular
 from relume.assets.environments.radiance_file import is_radiance, read_radiance_file
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported, with_subject
@@ -28,13 +28,16 @@ MAX_RADIANCE = 1e6
 _STRIP_ROWS = 64
 
 
-def read_environment(source: str | Path | bytes, name: str, max_width: int = SCENE_MAX_WIDTH) -> Environment:
+def read_environment(
+    source: str | Path | bytes, name: str, max_width: int = SCENE_MAX_WIDTH, *, is_mirror_ball: bool = False
+) -> Environment:
     """Read a panorama in a .hdr or .exr image.
 
     Args:
         source: a path or the file's bytes.
         name: name in messages.
         max_width: limit in texels; wider maps are scaled down to it.
+        is_mirror_ball: a square map is a mirror ball, not an angular map.
     Returns:
         The environment, equirectangular and in linear Rec. 709 for any projection and any primaries of the file, with
         one warning for each kind of change: NaN texels become the mean of valid neighbors, infinite ones the largest
@@ -46,7 +49,7 @@ def read_environment(source: str | Path | bytes, name: str, max_width: int = SCE
     data = _read_bytes(source, name)
     if not data:
         raise SceneError(f"environment {name!r} is empty: 0 bytes; export or download it again")
-    reader = _MapReader(name, max_width)
+    reader = _MapReader(name, max_width, is_mirror_ball=is_mirror_ball)
     if data.startswith(EXR_MAGIC):
         reader.read_exr(data)
     elif is_radiance(data):
@@ -59,8 +62,8 @@ def read_environment(source: str | Path | bytes, name: str, max_width: int = SCE
 class _MapReader:
     """Reads a map in strips of rows, and repairs and downsamples each by an integer factor."""
 
-    def __init__(self, name: str, max_width: int) -> None:
-        self._name, self._max_width = name, max_width
+    def __init__(self, name: str, max_width: int, *, is_mirror_ball: bool) -> None:
+        self._name, self._max_width, self._is_mirror_ball = name, max_width, is_mirror_ball
         self._strip_pixels: list[F32] = []
         self._warnings: list[ImporterWarning] = []
         self._num_broken = self._num_negative = self._num_texels = 0
@@ -158,14 +161,15 @@ class _MapReader:
         height, width, _ = pixels.shape
         if width == 2 * height:
             return pixels
-        panorama = find_panorama(pixels, self._is_openexr_cube)
+        panorama = find_panorama(pixels, is_openexr_cube=self._is_openexr_cube, is_mirror_ball=self._is_mirror_ball)
         if panorama is None:
             raise self._shape_error(width, height)
         radiance = to_equirectangular(panorama, pixels, min(panorama.width, self._max_width // 2 * 2))
         size = f"{radiance.shape[1]}×{radiance.shape[0]}"
-        self._add_warnings(
-            [approximated(f"is {width}×{height}: it was read as {panorama.name} and resampled to {size}.")]
-        )
+        message = f"is {width}×{height}: it was read as {panorama.name} and resampled to {size}"
+        is_certain = panorama.name != ANGULAR_MAP
+        doubt = "" if is_certain else "; a mirror ball has the same shape and must be converted before"
+        self._add_warnings([(approximated if is_certain else unsupported)(f"{message}{doubt}.")])
         self._width = radiance.shape[1]
         return radiance
 

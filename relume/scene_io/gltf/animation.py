@@ -1,4 +1,4 @@
-"""A moment of an animation: the transforms and morph weights of nodes at one time.
+"""A moment of the animations: the transforms and morph weights of nodes at one time.
 
     LINEAR       v = (1 − s) v_k + s v_{k+1};  slerp(v_k, v_{k+1}, s) for rotations
     CUBICSPLINE  v = (2s³ − 3s² + 1) v_k + (s³ − 2s² + s) Δ b_k + (3s² − 2s³) v_{k+1} + (s³ − s²) Δ a_{k+1}
@@ -9,6 +9,7 @@ after the last keyframe. glTF 2.0 specification, section 3.11 and appendix C.
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -23,34 +24,66 @@ from relume.scene_io.gltf.document import MAX_WEIGHTS, Animation, AnimationSampl
 F64 = NDArray[np.float64]
 POINTER = "KHR_animation_pointer"
 _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3, "weights": 1}
+_MAX_LISTED = 10
 _NEARLY_EQUAL = 0.9995  # cosine of the angle between rotations, whose slerp would divide by almost zero
 
 
 def pose_nodes(document: Document, time: float, accessors: AccessorReader, warnings: list[ImporterWarning]) -> None:
-    """Set the nodes of a document to a moment of its first animation.
+    """Set the nodes of a document to a moment of its animations.
+
+    Exporters write one animation for each object, or several of one object, such as walking and running. All that move
+    different properties apply; of those that move the same ones, the first.
 
     Args:
         document: of the file; its nodes change. time: seconds. accessors: of the file.
-        warnings: gets a sentence about the animation, and one for each kind of channel that cannot be read.
+        warnings: gets a sentence about the animations, and one for each kind of channel that cannot be read.
     """
     if not len(document.animations):
         warnings.append(ignored(f"The file has no animation; its time of {time:g} s has no effect."))
         return
-    try:
-        animation = document.animations.get(0)
-    except SceneError as problem:
-        warnings.append(unsupported(f"Objects are shown in their rest pose: {problem}."))
-        return
-    _Pose(document, animation, accessors, warnings).set(time)
+    moved = dict[tuple[int, str], str]()
+    shown, first, last = list[str](), inf, -inf
+    for index in range(len(document.animations)):
+        label = document.animations.label(index)
+        try:
+            animation = document.animations.get(index)
+        except SceneError as problem:
+            warnings.append(unsupported(f"Objects aren't moved by {label}: {problem}."))
+            continue
+        channels = ((channel.target.node, channel.target.path) for channel in animation.channels)
+        targets = {(node, path) for node, path in channels if node is not None}
+        earlier = next((moved[target] for target in sorted(targets & moved.keys())), None)
+        if earlier is not None:
+            warnings.append(ignored(f"Objects aren't moved by {label}: {earlier} moves the same ones."))
+            continue
+        moved |= dict.fromkeys(targets, label)
+        pose = _Pose(document, animation, label, accessors, warnings)
+        pose.set(time)
+        shown.append(label)
+        first, last = min(first, pose.first), max(last, pose.last)
+    if shown:
+        names = ", ".join(shown[:_MAX_LISTED]) + (
+            f" and {len(shown) - _MAX_LISTED:,} more" * (len(shown) > _MAX_LISTED)
+        )
+        duration = f", which lasts from {first:g} to {last:g} s" if time < first < inf or time > last > -inf else ""
+        warnings.append(ignored(f"Objects are shown at {time:g} s of {names}{duration}."))
 
 
 class _Pose:
+    """Sets the targets of one animation. first, last: times of its keyframes, seconds; ±inf before any is read"""
+
     def __init__(
-        self, document: Document, animation: Animation, accessors: AccessorReader, warnings: list[ImporterWarning]
+        self,
+        document: Document,
+        animation: Animation,
+        label: str,
+        accessors: AccessorReader,
+        warnings: list[ImporterWarning],
     ) -> None:
         self._document, self._animation, self._accessors, self._warnings = document, animation, accessors, warnings
-        self._label = document.animations.label(0)
+        self._label = label
         self._times: dict[int, F64] = {}
+        self.first, self.last = inf, -inf
 
     def set(self, time: float) -> None:
         """Set the target of each channel."""
@@ -63,7 +96,6 @@ class _Pose:
                 self._set_target(channel.target.node, channel.target.path, self._sampler(channel.sampler), time)
             except SceneError as problem:
                 faults.append(str(problem))
-        self._warn_time(time)
         if pointers:
             message = f"Values that {self._label} changes by {POINTER} were ignored ({pointers:,}): not supported."
             self._warnings.append(unsupported(message))
@@ -116,17 +148,8 @@ class _Pose:
             if not len(times) or not np.isfinite(times).all() or (np.diff(times) < 0).any():
                 raise SceneError("the times of its keyframes are missing, not finite, or not ascending")
             self._times[index] = times
+            self.first, self.last = min(self.first, float(times[0])), max(self.last, float(times[-1]))
         return self._times[index]
-
-    def _warn_time(self, time: float) -> None:
-        others = [self._document.animations.label(number) for number in range(1, len(self._document.animations))]
-        shown = f"Objects are shown at {time:g} s of {self._label}"
-        if self._times:
-            first = min(times[0] for times in self._times.values())
-            last = max(times[-1] for times in self._times.values())
-            shown += "" if first <= time <= last else f", which lasts from {first:g} to {last:g} s"
-        listed = ", ".join(others[:10]) + (f" and {len(others) - 10:,} more" if len(others) > 10 else "")
-        self._warnings.append(ignored(f"{shown}{f', not of {listed}' if others else ''}."))
 
 
 def interpolate(

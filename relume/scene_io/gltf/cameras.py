@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.math.bounding_box import bounding_box
+from relume.math.bounding_box import box_corners
 from relume.scene.model import Camera, Mesh
 from relume.scene.unique_names import append_number
 
@@ -66,5 +66,4 @@ def _extremes(positions: NDArray[np.float32]) -> NDArray[np.float32]:
     """Points to frame: the vertices, or for a large mesh the corners of its bounding box."""
     if len(positions) <= 100_000:
         return positions
-    low, high = bounding_box(positions)
-    return np.asarray(np.where(np.indices((2, 2, 2)).reshape(3, -1).T == 0, low, high), np.float32)
+    return box_corners(positions)

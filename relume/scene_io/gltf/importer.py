@@ -6,12 +6,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
 from relume.core.import_warnings import approximated, ignored, quote, unsupported
+from relume.math.bounding_box import bounding_box, box_corners
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize, no_triangles
 from relume.scene.merge_meshes import merge_by_material
@@ -40,7 +42,8 @@ from relume.scene_io.gltf.skins import read_skins, skin_geometry
 from relume.scene_io.gltf.unknown_extensions import warn_unknown_extensions
 from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, variant_names
 from relume.scene_io.gltf.world_mesh import BoundPrimitive, make_world_mesh
-from relume.scene_io.import_options import ImportOptions
+from relume.scene_io.import_options import ImportOptions, Recenter
+from relume.scene_io.origin import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
 from relume.scene_io.surfaces.make_material import NO_COLORS, ReadMaterial, VertexColors
 from relume.scene_io.surfaces.material_textures import TextureLayout
@@ -66,7 +69,7 @@ def import_gltf(
         name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: files that it may refer to; None for none.
-        options: `light_unit`, `scene_name` and `time`; None for the defaults.
+        options: `light_unit`, `scene_name`, `time`, and `recenter` of a scene far from zero; None for the defaults.
 
     Returns:
         The scene, with node transforms applied: one mesh per primitive and node, cameras or one view "front", lights
@@ -78,7 +81,8 @@ def import_gltf(
     builder = _SceneBuilder(read_container(data, companions or NoFiles(), []), options or ImportOptions())
     materials = [read_material.material for read_material in builder.materials]
     contents = (name, builder.meshes, materials, builder.cameras, environment or studio())
-    return finalize(*contents, builder.warnings, builder.variants, builder.lights)
+    x, y, z = builder.origin.tolist()
+    return finalize(*contents, builder.warnings, builder.variants, builder.lights, (x, y, z))
 
 
 class PrimitiveKey(NamedTuple):
@@ -121,9 +125,16 @@ class _SceneBuilder:
         self.materials: list[ReadMaterial] = []
         self.meshes: list[Mesh] = []
         self.cameras: list[Camera] = []
+        self._shown: list[tuple[PrimitiveKey, str, F64]] = []  # with the name and transform of each mesh
         self._list_primitives()
         for placed in self._nodes:
-            self._add_node(placed)
+            self._list_meshes(placed)
+        self.origin = self._choose_origin(options.recenter)
+        self.warnings.extend(moved_warning(self.origin))
+        for key, name, to_world in self._shown:
+            self._add_primitive(key, name, self._moved(to_world))
+        for placed in self._nodes:
+            self._add_view_and_light(placed)
         if self._flattened:
             num, first = len(self._flattened), self._flattened[0]
             message = f"{num:,} meshes are flattened by the scale of their nodes, for example {quote(first)}."
@@ -131,7 +142,7 @@ class _SceneBuilder:
         if len(self.meshes) > _MAX_SEPARATE_MESHES:
             self.meshes = merge_by_material(self.meshes)
         if not self.meshes:
-            raise SceneError(no_triangles(self.warnings))
+            raise SceneError(no_triangles(self.warnings, self._contents()))
         emissions = [np.array(read_material.emission) for read_material in self.materials]
         scene_materials = [read_material.material for read_material in self.materials]
         lit = self._collector.emissive_light(scene_materials, emissions, self.meshes)
@@ -143,6 +154,13 @@ class _SceneBuilder:
         warn_unknown_extensions(self._document, self.warnings)
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
+
+    def _contents(self) -> str:
+        """Contents of a file that shows nothing, as a clause."""
+        if not len(self._document.meshes):
+            return "the file has no meshes"
+        shown = any(placed.node.mesh is not None and placed.is_visible for placed in self._nodes)
+        return "its triangles have no area" if shown else "no node of the scene shows a mesh"
 
     def _list_primitives(self) -> None:
         """Group the primitives of visible nodes by material and its variants."""
@@ -184,14 +202,16 @@ class _SceneBuilder:
         if message not in self.warnings:
             self.warnings.append(unsupported(message))
 
-    def _add_node(self, placed: PlacedNode) -> None:
-        node = placed.node
-        if node.camera is not None:
-            self._add_camera(node, placed.to_world)
-        if not placed.is_visible:
-            return
-        self._light_reader.add(node, self._document.nodes.label(placed.number), placed.to_world)
-        keys = self._keys(placed)
+    def _add_view_and_light(self, placed: PlacedNode) -> None:
+        to_world = self._moved(placed.to_world)
+        if placed.node.camera is not None:
+            self._add_camera(placed.node, to_world)
+        if placed.is_visible:
+            self._light_reader.add(placed.node, self._document.nodes.label(placed.number), to_world)
+
+    def _list_meshes(self, placed: PlacedNode) -> None:
+        """List what a visible node shows."""
+        node, keys = placed.node, self._keys(placed)
         if node.mesh is None or not keys:
             return
         mesh_name = self._document.meshes.get(node.mesh).name
@@ -202,7 +222,27 @@ class _SceneBuilder:
         for instance in instances:
             for key in keys:
                 name = unique_name(node.name or mesh_name or "mesh", self._mesh_names)
-                self._add_primitive(key, name, instance if key.skin is not None else placed.to_world @ instance)
+                self._shown.append((key, name, instance if key.skin is not None else placed.to_world @ instance))
+
+    def _choose_origin(self, recenter: Recenter) -> Shaped[F64, " 3"]:
+        """The new origin of a scene so far from zero that rounding to single precision would change its shape.
+
+        Others, and zero if there is nothing to show, are left to `relume.scene_io.placement.place`.
+        """
+        boxes, shown = list[F64](), list[tuple[GltfGeometry, F64]]()
+        for key, name, to_world in self._shown:
+            geometry = self._read_geometry(key, name)
+            if geometry is not None and len(geometry.positions):
+                shown.append((geometry, to_world))
+                boxes.append(_world_bounds(box_corners(geometry.positions), to_world))
+        if recenter == "never" or not boxes or not choose_origin(*_union(boxes), "auto").any():
+            return np.zeros(3)
+        return choose_origin(*_union([_world_bounds(each.positions, to_world) for each, to_world in shown]), "always")
+
+    def _moved(self, to_world: F64) -> F64:
+        moved = to_world.copy()
+        moved[:3, 3] -= self.origin
+        return moved
 
     def _read_geometry(self, key: PrimitiveKey, name: str) -> GltfGeometry | None:
         if key not in self._geometry:
@@ -373,3 +413,14 @@ class _SceneBuilder:
         if num_animations := len(self._document.root.animations):
             animations = "1 animation was" if num_animations == 1 else f"{num_animations} animations were"
             self.warnings.append(ignored(f"{animations} ignored: objects are shown in their rest pose."))
+
+
+def _world_bounds(positions: Shaped[Any, "points 3"], to_world: F64) -> Shaped[F64, "2 3"]:
+    """Lowest and highest coordinates in world space."""
+    world = positions.astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3]
+    return np.stack(bounding_box(world))
+
+
+def _union(boxes: list[F64]) -> tuple[Shaped[F64, " 3"], Shaped[F64, " 3"]]:
+    """Lowest and highest coordinates of bounding boxes."""
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)

@@ -47,11 +47,11 @@ def import_materialx(data: bytes, companions: Companions) -> MaterialXDocument:
         MaterialError: it is damaged, too large, or has no material; or MaterialX is not installed.
         SceneError: its images are too large.
     """
+    document, included = parse_materialx(data)
     warnings = [
         ignored(f"The included file {quote(name)} wasn't read; definitions of MaterialX are built in.")
-        for name in check_xml(data)
+        for name in included
     ]
-    document = _parse(data)
     images = SurfaceImages(_DocumentImages(companions, warnings), warnings)
     reader, maker = (
         SurfaceReader(NodeValues(IMAGE_NODES, warnings), images, warnings),
@@ -91,7 +91,13 @@ class _DocumentImages:
         return printable(file)
 
 
-def _parse(data: bytes) -> Any:
+def parse_materialx(data: bytes) -> tuple[Any, list[str]]:
+    """The MaterialX document of a .mtlx file, and the files that it includes, which are not read.
+
+    Raises:
+        MaterialError: it is damaged or too large, or MaterialX is not installed.
+    """
+    included = check_xml(data)
     try:
         import MaterialX as mx  # optional, and slow to import  # noqa: N813
     except ImportError:
@@ -105,13 +111,13 @@ def _parse(data: bytes) -> Any:
         raise MaterialError("the .mtlx file isn't UTF-8; save it as UTF-8") from None
     except (mx.Exception, RuntimeError, LookupError) as error:
         raise MaterialError(f"MaterialX can't read the .mtlx file ({str(error)[:200]}); export it again") from None
-    return document
+    return document, included
 
 
 def _surfaces(document: Any, warnings: list[ImporterWarning]) -> Iterator[tuple[str, Element]]:
     """Names and shaders of all materials; without a material, those of the shaders."""
     materials = document.getMaterialNodes()
-    shaders = [(material.getName(), _connected(material, "surfaceshader")) for material in materials]
+    shaders = [(material.getName(), connected_node(material, "surfaceshader")) for material in materials]
     if not materials:
         shaders = [(node.getName(), node) for node in document.getNodes() if node.getType() == "surfaceshader"]
     for name, shader in shaders:
@@ -125,10 +131,11 @@ def _surfaces(document: Any, warnings: list[ImporterWarning]) -> Iterator[tuple[
     warnings += [
         unsupported(f"Displacement of material {quote(material.getName())} isn't supported.")
         for material in materials
-        if _connected(material, "displacementshader") is not None
+        if connected_node(material, "displacementshader") is not None
     ]
 
 
-def _connected(material: Element, name: str) -> Element | None:
+def connected_node(material: Element, name: str) -> Element | None:
+    """The node that an input of a material is connected to; None if there is none."""
     port = material.getInput(name)
     return None if port is None else port.getConnectedNode()

@@ -31,7 +31,7 @@ from relume.scene_io.obj_ply.polygons import CutPolygons, triangulate
 from relume.scene_io.obj_ply.stl import read_stl
 from relume.scene_io.obj_ply.text import counted
 from relume.scene_io.obj_ply.weld import Corners, make_mesh, used_rows
-from relume.scene_io.placement import choose_origin, moved_warning
+from relume.scene_io.origin import choose_origin, moved_warning
 from relume.scene_io.referenced_files import Companions, NoFiles
 from relume.scene_io.surfaces.uv_transforms import UvSlot
 
@@ -88,7 +88,7 @@ class _Builder:
     def scene(self, name: str, environment: Environment | None, origin: F64) -> Scene:
         """The finished scene. Raises SceneError with all faults if there is nothing to show."""
         if not self.meshes:
-            raise SceneError(no_triangles(self.warnings))
+            raise SceneError(no_triangles(self.warnings, "the file has no faces with an area"))
         self.maker.warn_gloss()
         collector = LightCollector(self.warnings)
         materials = collector.emissive_light(self.materials, self.emissions, self.meshes)

@@ -91,9 +91,9 @@ def parse_map(tokens: Sequence[str]) -> MtlMap:
     options: dict[str, list[Any]] = {}
     k = 0
     while k < len(tokens):
-        option, k = tokens[k], k + 1
+        option, k = tokens[k].lower(), k + 1
         if option not in OPTIONS:
-            name.append(option)
+            name.append(tokens[k - 1])
             continue
         if option in FILLS or option == "-mm":
             values = _leading_numbers(tokens[k : k + OPTIONS[option]])

@@ -11,22 +11,21 @@ from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Color, Scalar, SurfaceInputs, lerp, scaled
 from relume.scene_io.surfaces.surface_parameters import BLACK, WHITE, from_microfacet_widths
 
-_COAT_IOR = 1.5  # of the term
-_VISIBLE_IOR_DIFFERENCE = 0.02
 MAX_EMISSION = 1e9
 
 
-def read_ior(inputs: SurfaceInputs, name: str) -> float:
-    """An index of refraction; 1.5 with a warning if no dielectric has it.
+def read_ior(inputs: SurfaceInputs, name: str, default: float = 1.5) -> float:
+    """An index of refraction; the default with a warning if no dielectric has it.
 
     Args:
-        inputs: of the surface. name: of the input.
+        inputs: of the surface. name: of the input. default: of the model.
     """
-    ior = inputs.number(name, 1.5, inf)
+    ior = inputs.number(name, default, inf)
     if 0 < ior <= MAX_IOR:
         return ior
-    inputs.warn_unsupported(f"The index of refraction {ior:g} of {inputs.label} is out of range; 1.5 is used.")
-    return 1.5
+    kind = "index of refraction of the coat" if name.startswith("coat") else "index of refraction"
+    inputs.warn_unsupported(f"The {kind} {ior:g} of {inputs.label} is out of range; {default:g} is used.")
+    return default
 
 
 def subsurface_base(inputs: SurfaceInputs, base: Color, weight: float, subsurface: Color) -> Color:
@@ -43,20 +42,17 @@ def subsurface_base(inputs: SurfaceInputs, base: Color, weight: float, subsurfac
     return subsurface if weight >= 0.5 else base
 
 
-def coat_tint(inputs: SurfaceInputs, weight: Scalar, ior: float, **differences: bool) -> Color:
+def coat_tint(inputs: SurfaceInputs, weight: Scalar, **differences: bool) -> Color:
     """The factor of the layers below a coat that absorbs light; all approximations of the coat are one warning.
 
     Args:
-        inputs: with the transmittance `coat_color`. weight: of the coat. ior: its index of refraction.
+        inputs: with the transmittance `coat_color`. weight: of the coat.
         differences: names of effects on the coat or below it, and whether the document has them.
     """
     if not isinstance(weight, ImageInput) and weight == 0:
         return WHITE
     color = inputs.color("coat_color", WHITE)
-    ignored = [f"its index of refraction {ior:g} is shown as {_COAT_IOR}"] * (
-        abs(ior - _COAT_IOR) > _VISIBLE_IOR_DIFFERENCE
-    )
-    ignored += [_COAT_DIFFERENCES[name] for name, applies in differences.items() if applies]
+    ignored = [_COAT_DIFFERENCES[name] for name, applies in differences.items() if applies]
     ignored += ["it is tinted the same from all sides"] * (color != WHITE)
     if ignored:
         inputs.warn_approximated(f"The coat of {inputs.label} is approximated: {', '.join(ignored)}.")

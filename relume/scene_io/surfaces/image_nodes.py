@@ -144,8 +144,14 @@ def _placement(values: NodeValues, node: ShaderNode, name: str) -> Placement:
         return Placement(f"st{index}" if index else "st")
     if category in _UVS:
         return Placement(values.text(coordinates, "geomprop") or values.text(coordinates, "varname", "st"))
+    if category == "convert":
+        return _placement(values, coordinates, "in")
     if category == "multiply":
         return _placement(values, coordinates, "in1").then(values.pair(coordinates, "in2", ONE), ZERO)
+    if category == "add":
+        return _placement(values, coordinates, "in1").then(ONE, values.pair(coordinates, "in2", ZERO))
+    if category in ("rotate2d", "rotate3d"):
+        return _placement(values, coordinates, "in").then(ONE, ZERO, -_rotation_about_z(values, coordinates))
     if category == "UsdTransform2d":
         return _placement(values, coordinates, "in").then(
             values.pair(coordinates, "scale", ONE),
@@ -162,6 +168,18 @@ def _placement(values: NodeValues, node: ShaderNode, name: str) -> Placement:
         values.pair(coordinates, "rotate", ZERO)[0],
         offset_first=_is_offset_first(values, coordinates, 0),
     )
+
+
+def _rotation_about_z(values: NodeValues, node: ShaderNode) -> float:
+    """Degrees of a node `rotate2d` or `rotate3d`, clockwise; others than about ±z are a warning."""
+    degrees = values.pair(node, "amount", ZERO)[0]
+    if node.category == "rotate2d" or degrees == 0:
+        return degrees
+    x, y, z = values.numbers(node, "axis", (0.0, 1.0, 0.0))
+    if x or y or not z:
+        values.warn(f"The rotation of texture coordinates by node {quote(node.name)} isn't supported; it is ignored.")
+        return 0.0
+    return degrees if z > 0 else -degrees
 
 
 def _is_offset_first(values: NodeValues, node: ShaderNode, default: int) -> bool:

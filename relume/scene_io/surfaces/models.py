@@ -24,6 +24,8 @@ MODELS = {
 MESH_COLORS = "displayColor"  # primvar
 _BASE_COLORS = ("base_color", "diffuseColor")
 _TANGENTS = ("tangent", "geometry_tangent", "geometry_coat_tangent")
+_NORMALS = ("normal", "geometry_normal", "coat_normal", "geometry_coat_normal", "clearcoat_normal")
+_FRAME = dict.fromkeys(_NORMALS, "normal") | dict.fromkeys(_TANGENTS, "tangent")
 _COAT_NORMALS = ("coat_normal", "geometry_coat_normal", "clearcoat_normal")
 
 
@@ -62,6 +64,8 @@ class SurfaceReader:
         """
         values, has_mesh_colors = dict[str, Value](), False
         for name, value in self._nodes.surface(ports, label).items():
+            if isinstance(value, PrimvarReference) and _FRAME.get(name) == value.name:
+                continue  # that of the surface, which is the default
             if name in _TANGENTS or (name in _COAT_NORMALS and isinstance(value, ImageInput)):
                 self._warnings.append(unsupported(f"{name} of {label} isn't supported."))
             elif not isinstance(value, PrimvarReference):

@@ -25,6 +25,7 @@ SRGB = ("srgb", "srgb_texture", "srgb_rec709_scene", "srgb_rec709_display", "g22
 LINEAR = (
     "", "lin_rec709", "lin_rec709_scene", "lin_srgb", "linear", "none", "raw", "data", "scene-linear rec.709-srgb"
 )  # fmt: skip
+FRAME_VECTORS = ("normal", "tangent")  # nodes: of the surface
 _CHANNELS = {"x": "r", "y": "g", "z": "b", "w": "a", "r": "r", "g": "g", "b": "b", "a": "a"}
 _ONE: Rgb = (1.0, 1.0, 1.0)
 
@@ -192,7 +193,9 @@ class NodeValues:
         category = node.category
         if category in self._image_nodes:
             return self._image_nodes[category](self, node, output)
-        if category in ("constant", "dot", "convert"):
+        if category in FRAME_VECTORS:
+            return PrimvarReference(category)
+        if category in ("constant", "dot", "convert", "normalize"):
             return self._optional(node, "value" if category == "constant" else "in")
         if category == "extract":
             index = round(self.numbers(node, "index", (0.0, 0.0, 0.0))[0])
@@ -210,6 +213,7 @@ class NodeValues:
 
 NODES = (
     *("constant", "dot", "convert", "extract", "separate2", "separate3", "separate4", "multiply", "normalmap"),
+    *("add", "rotate2d", "rotate3d", "normalize", *FRAME_VECTORS),
     *("geompropvalue", "UsdPrimvarReader", "texcoord", "place2d", "UsdTransform2d"),
 )
 """Categories that are supported, beside those of images."""

@@ -33,7 +33,6 @@ def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
     tint = coat_tint(
         inputs,
         coat,
-        inputs.number("coat_ior", 1.6, 10),
         darkens=inputs.number("coat_darkening", 1) > 0,
         is_anisotropic=inputs.number("coat_roughness_anisotropy", 0) > 0,
     )
@@ -58,6 +57,7 @@ def open_pbr(inputs: SurfaceInputs) -> SurfaceParameters:
         anisotropy=anisotropy,
         clearcoat=coat,
         clearcoat_roughness=inputs.scalar("coat_roughness", 0),
+        clearcoat_ior=read_ior(inputs, "coat_ior", 1.6),
         sheen_color=inputs.color("fuzz_color", WHITE),
         sheen_weight=inputs.scalar("fuzz_weight", 0),
         sheen_roughness=inputs.scalar("fuzz_roughness", 0.5),

@@ -29,7 +29,6 @@ def standard_surface(inputs: SurfaceInputs) -> SurfaceParameters:
     tint = coat_tint(
         inputs,
         coat,
-        inputs.number("coat_IOR", 1.5, 10),
         is_anisotropic=inputs.number("coat_anisotropy", 0) > 0,
         blurs=inputs.number("coat_affect_roughness", 0) > 0,
         deepens=inputs.number("coat_affect_color", 0) > 0,
@@ -54,6 +53,7 @@ def standard_surface(inputs: SurfaceInputs) -> SurfaceParameters:
         anisotropy_rotation=2 * pi * inputs.number("specular_rotation", 0),
         clearcoat=coat,
         clearcoat_roughness=inputs.scalar("coat_roughness", 0.1),
+        clearcoat_ior=read_ior(inputs, "coat_IOR"),
         sheen_color=inputs.color("sheen_color", WHITE),
         sheen_weight=inputs.scalar("sheen", 0),
         sheen_roughness=inputs.scalar("sheen_roughness", 0.3),

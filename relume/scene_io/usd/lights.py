@@ -6,6 +6,7 @@ relume does not have become the nearest one with the same power in its main dire
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ F32 = NDArray[np.float32]
 MAX_INTENSITY = 1e30
 _MAX_RADIANCE = 1e6  # of domes
 UNIFORM_SIZE = (2, 4)  # texels of a dome without an image
+_BLENDER_VERSION = re.compile(r"Blender v(\d{1,4})\.")
+_BLENDER_SUN, _BLENDER_REASON = 4.0, "Blender writes a quarter"
 DOMES = ("DomeLight", "DomeLight_1")
 KINDS = ("DistantLight", "SphereLight", "DiskLight", "RectLight", "CylinderLight", *DOMES)
 
@@ -89,7 +92,7 @@ class UsdLightReader:
             "direction": (-to_world[:3, 2] / scale[2]).tolist(),
         }
         if kind == "DistantLight":
-            self._add_distant(prim, fields, emitted)
+            self._add_distant(prim, fields, emitted, label)
         elif kind in ("RectLight", "DiskLight"):
             self._add_flat(prim, kind, fields, emitted, to_world, scale, label)
         else:
@@ -102,14 +105,26 @@ class UsdLightReader:
     def _is_normalized(self, prim: Any) -> bool:
         return bool(prim.GetAttribute("inputs:normalize").Get(self._time))
 
-    def _add_distant(self, prim: Any, fields: dict[str, Any], emitted: F64) -> None:
+    def _add_distant(self, prim: Any, fields: dict[str, Any], emitted: F64, label: str) -> None:
         """Irradiance E = L π sin²(angle / 2); of a normalized light, or one without an angle, E = L."""
         half_angle = np.radians(np.clip(self._number(prim, "angle"), 0, 180)) / 2
         if half_angle > 0 and not self._is_normalized(prim):
             emitted = emitted * np.pi * np.sin(half_angle) ** 2
+        if self._is_from_blender(prim):
+            emitted = _BLENDER_SUN * emitted
+            self._warnings.append(
+                approximated(
+                    f"{_capital(label)} is {_BLENDER_SUN:g} times as bright as in the file: {_BLENDER_REASON}."
+                )
+            )
         self._collector.add(
             self._collector.name(prim.GetName()), {"kind": "directional", "direction": fields["direction"]}, emitted
         )
+
+    def _is_from_blender(self, prim: Any) -> bool:
+        """True if a stage is by a version of Blender that writes a quarter of a sun's irradiance."""
+        version = _BLENDER_VERSION.match(prim.GetStage().GetRootLayer().documentation)
+        return version is not None and int(version[1]) >= 5
 
     def _add_flat(
         self, prim: Any, kind: str, fields: dict[str, Any], emitted: F64, to_world: F64, scale: F64, label: str
@@ -213,14 +228,18 @@ class UsdLightReader:
         emitted, name = radiance(prim, self._time), prim.GetName()[:80] or "dome"
         path = prim.GetAttribute("inputs:texture:file").Get(self._time)
         data = self._images.files.read(path.path, label) if path and path.path else None
+        projection = prim.GetAttribute("inputs:texture:format").Get(self._time)
         uniform = Environment(name, np.ones((*UNIFORM_SIZE, 3), np.float32))
         try:
-            image = uniform if data is None else read_environment(data, name)
+            is_ball = projection == "mirroredBall"
+            image = uniform if data is None else read_environment(data, name, is_mirror_ball=is_ball)
         except SceneError as error:
             self._warnings.append(unsupported(f"The texture of {label} was skipped: {error}."))
             image = uniform
-        if prim.GetAttribute("inputs:texture:format").Get(self._time) not in (None, "automatic", "latlong"):
-            self._warnings.append(unsupported(f"The texture of {label} is read as equirectangular."))
+        if projection not in (None, "automatic", "latlong", "angular", "mirroredBall"):
+            self._warnings.append(
+                unsupported(f"The texture of {label} is read by its shape, not as {quote(projection)}.")
+            )
         pixels = image.radiance if image is uniform else _rotate(image.radiance, to_world[:3, :3] @ self._pole(prim))
         pixels = np.minimum(pixels * emitted.astype(np.float32), np.float32(_MAX_RADIANCE))
         if pixels.any():

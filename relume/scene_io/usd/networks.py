@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -40,18 +40,33 @@ class UsdSurfaceReader:
         Args:
             material: the material. label: names it in warnings.
         """
-        shaders = [node for context in ("", MATERIALX) if (node := self._surface_node(material, context)) is not None]
+        # the context of a network before the universal one, as in Hydra: exporters write placeholders into the latter
+        shaders = [node for context in (MATERIALX, "") if (node := self._surface_node(material, context)) is not None]
         for node in shaders:
             if node.category in MODELS:
-                return self._reader.read(node.category, node.ports(), label)
+                if node is not shaders[0]:
+                    other = f"its MaterialX shader {quote(shaders[0].category)} isn't supported"
+                    self._warnings.append(unsupported(f"{_capital(label)} is shown by its plain surface: {other}."))
+                return _with_cutoff(self._reader.read(node.category, node.ports(), label), shaders[-1])
         reason = f"its shader {quote(shaders[0].category)} isn't supported" if shaders else "it has no surface shader"
-        self._warnings.append(unsupported(f"{label[0].upper()}{label[1:]} is shown gray: {reason}."))
+        self._warnings.append(unsupported(f"{_capital(label)} is shown gray: {reason}."))
         return GRAY
 
     def _surface_node(self, material: Any, context: str) -> UsdNode | None:
         source = material.ComputeSurfaceSource(context)
         shader = source[0] if isinstance(source, tuple) else source
         return UsdNode(shader, self._time) if shader and shader.GetPrim().IsValid() else None
+
+
+def _with_cutoff(surface: SurfaceParameters, plain: UsdNode) -> SurfaceParameters:
+    """A surface with the alpha test of the surface for other renderers: MaterialX has none."""
+    port = plain.port("opacityThreshold")
+    cutoff = 0.0 if port is None or port.node() is not None else next(iter(port.numbers()), 0.0)
+    return replace(surface, alpha_mode="MASK", alpha_cutoff=cutoff) if 0 < cutoff <= 1 else surface
+
+
+def _capital(label: str) -> str:
+    return label[0].upper() + label[1:]
 
 
 @dataclass(frozen=True)

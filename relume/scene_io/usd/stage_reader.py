@@ -29,7 +29,8 @@ from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.gltf.degenerate_transforms import cofactors, determinant
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply.weld import Corners, make_mesh
-from relume.scene_io.placement import TO_Y_UP, choose_origin, moved_warning
+from relume.scene_io.origin import choose_origin, moved_warning
+from relume.scene_io.placement import TO_Y_UP
 from relume.scene_io.referenced_files import Companions, NoFiles
 from relume.scene_io.surfaces.surface_images import SurfaceImages
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
@@ -140,11 +141,11 @@ class _StageReader:
         self._visit(self._stage.GetPseudoRoot(), root, self._transforms.GetLocalToWorldTransform, 0)
         self._warn_stage()
         if not self._shapes:
-            raise SceneError(no_triangles(self._warnings))
+            raise SceneError(no_triangles(self._warnings, "the stage shows no mesh or shape"))
         origin = self._recenter()
         materials, meshes = self._materials_and_meshes(meters, origin)
         if not meshes:
-            raise SceneError(no_triangles(self._warnings))
+            raise SceneError(no_triangles(self._warnings, "its triangles have no area"))
         if len(meshes) > _MAX_SEPARATE_MESHES:
             meshes = merge_by_material(meshes)
         collector = LightCollector(self._warnings)

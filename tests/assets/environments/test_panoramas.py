@@ -64,13 +64,19 @@ def vertical_cross(blank=0.0):
     return cross([[None, up, None], [left, front, right], [None, down, None], [None, turned, None]], blank)
 
 
-def angular_map(size=256):
-    """Debevec's formula: front −Z, right +X, the angle from the front π times the radius."""
+def disk(angle_of, size=256):
+    """Front −Z, right +X; angle_of: the angle from the front, from the radius."""
     t = (np.arange(size) + 0.5) / size * 2 - 1
     u, v = np.meshgrid(t, -t)
     radius, theta = np.hypot(u, v), np.arctan2(v, u)
-    x, y, z = np.sin(np.pi * radius) * np.cos(theta), np.sin(np.pi * radius) * np.sin(theta), -np.cos(np.pi * radius)
+    angle = angle_of(np.minimum(radius, 1))
+    x, y, z = np.sin(angle) * np.cos(theta), np.sin(angle) * np.sin(theta), -np.cos(angle)
     return np.where(radius[..., None] <= 1, radiance(np.stack([-z, y, x], axis=-1)), np.float32(0))
+
+
+def angular_map():
+    """Debevec's formula: the angle is π times the radius."""
+    return disk(lambda radius: np.pi * radius)
 
 
 LAYOUTS = {
@@ -80,7 +86,7 @@ LAYOUTS = {
     "a row of six cube faces in the order of OpenEXR": np.concatenate(openexr_faces(), 1),
     "a column of six cube faces in the order of Direct3D and OpenGL": np.concatenate(graphics_faces(), 0),
     "a row of six cube faces in the order of Direct3D and OpenGL": np.concatenate(graphics_faces(), 1),
-    "an angular map, not a mirror ball,": angular_map(),
+    "an angular map": angular_map(),
 }
 
 
@@ -89,16 +95,29 @@ LAYOUTS = {
 def test_other_projections_show_the_same_radiance(tmp_path, name, suffix):
     environment = read_environment(write_map(tmp_path / f"a.{suffix}", LAYOUTS[name]), "probe")
     height, width, _ = environment.radiance.shape
-    assert width == 2 * height == (512 if name == "an angular map, not a mirror ball," else 4 * FACE)
+    assert width == 2 * height == (512 if name == "an angular map" else 4 * FACE)
     expected = radiance(texel_directions(height, width))
     error = np.abs(environment.radiance / expected - 1)
     assert error.mean() < 0.01
     assert error.max() < 0.1
     (warning,) = environment.warnings
     rows, columns, _ = LAYOUTS[name].shape
-    assert (
-        warning == f"Environment “probe” is {columns}×{rows}: it was read as {name} and resampled to {width}×{height}."
-    )
+    end = "; a mirror ball has the same shape and must be converted before" if name == "an angular map" else ""
+    read = f"is {columns}×{rows}: it was read as {name} and resampled to {width}×{height}{end}."
+    assert warning == f"Environment “probe” {read}"
+    assert warning.severity == ("unsupported" if end else "approximated")
+
+
+def test_a_mirror_ball_reflects_the_same_radiance(tmp_path):
+    """An orthographic camera sees the direction at the angle θ from the front at the radius sin(θ / 2)."""
+    path = write_map(tmp_path / "ball.exr", disk(lambda radius: 2 * np.arcsin(radius)))
+    environment = read_environment(path, "probe", is_mirror_ball=True)
+    directions = texel_directions(*environment.radiance.shape[:2])
+    error = np.abs(environment.radiance / radiance(directions) - 1)
+    assert error[directions[..., 0] > -0.9].max() < 0.1  # +X is the front; the back is the rim of the ball
+    assert error.mean() < 0.01
+    (warning,) = environment.warnings
+    assert "read as a mirror ball" in warning
     assert warning.severity == "approximated"
 
 

@@ -49,6 +49,25 @@ def test_a_map_in_other_primaries_has_the_same_radiance(tmp_path):
     np.testing.assert_array_equal(plain.radiance, expected)
 
 
+def test_a_color_space_may_be_named_instead(tmp_path):
+    """`colorInteropID` of OpenEXR 3.4; chromaticities, if there are any, decide."""
+    expected = dusk()
+    other = (expected @ np.linalg.inv(np.array(OF_2020)).T).astype(np.float32)
+    for name, chromaticities, pixels in (
+        ("lin_rec2020_scene", None, other),
+        ("lin_rec709_scene", None, expected),
+        ("lin_ap1_scene", REC_2020, other),
+    ):
+        path = write_map(tmp_path / "a.exr", pixels, chromaticities, colorInteropID=name)
+        actual = read_environment(path, "dusk")
+        np.testing.assert_allclose(actual.radiance, expected, atol=2e-3 * expected.max(), rtol=2e-3)
+        assert actual.warnings == ()
+    unknown = read_environment(write_map(tmp_path / "b.exr", expected, colorInteropID="srgb_p3d65_scene"), "dusk")
+    np.testing.assert_array_equal(unknown.radiance, expected)
+    (warning,) = unknown.warnings
+    assert "color space “srgb_p3d65_scene”; it was read as linear Rec. 709" in warning
+
+
 @pytest.mark.parametrize("chromaticities", [None, REC_2020])
 def test_infinite_texels_are_as_bright_as_possible(tmp_path, chromaticities):
     """A sun that exceeds the format stays a white sun; infinite red stays red."""

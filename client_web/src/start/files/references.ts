@@ -80,12 +80,8 @@ export async function findReferences(
   scene: DroppedFile,
   findFile: FindFile,
   images: readonly DroppedFile[],
-  layers: readonly DroppedFile[],
 ): Promise<References> {
   const suffix = scene.path.toLowerCase().split(".").at(-1);
-  // binary layers cannot be searched here: all that a stage may consist of is sent
-  if (layers.includes(scene))
-    return { companions: [...layers, ...images].filter((file) => file !== scene), missing: [] };
   if (suffix === "obj") return findObjReferences(scene, findFile, images);
   if (suffix === "glb") return resolveReferences(scene, parseUris(await readGlbJson(scene.file)), findFile);
   if (suffix === "gltf" && scene.file.size <= MAX_TEXT_BYTES)

@@ -1,6 +1,6 @@
 /** Messages about rejected files: the reason, and where they can be used. */
 import type { DroppedFile } from "./dropTypes";
-import { endsWith, isImportable, isSceneFile, MEASURED_SUFFIXES } from "./sceneFiles";
+import { endsWith, isImportable, isLayer, isSceneFile, MATERIALX_SUFFIX, MEASURED_SUFFIXES } from "./sceneFiles";
 
 /** Unsupported formats of measured materials. */
 const OTHER_MEASURED_SUFFIXES = [".merl", ".mbdf"];
@@ -41,10 +41,15 @@ export function editorRejection(files: readonly DroppedFile[]): string {
   return `Can't use ${listFileNames(files)} here. ${rejectionReason(files, otherwise)}`;
 }
 
-/** Message if the start page cannot import some dropped files; null if it can. A folder may contain unrelated files. */
-export function startPageRejection(files: readonly DroppedFile[]): string | null {
+/**
+ * Message if the start page cannot import some dropped files; null if it can. A folder may contain unrelated files, and
+ * MaterialX documents belong to a USD layer, here or among the files chosen before.
+ */
+export function startPageRejection(files: readonly DroppedFile[], chosen: readonly DroppedFile[] = []): string | null {
   const formats = `${SCENES_MESSAGE} HDRIs: HDR or EXR.`;
-  const rejected = files.filter((each) => !isImportable(each) && !each.path.includes("/"));
+  const hasLayer = [...chosen, ...files].some(isLayer);
+  const isUsable = (each: DroppedFile) => isImportable(each) && (hasLayer || !endsWith(each.path, [MATERIALX_SUFFIX]));
+  const rejected = files.filter((each) => !isUsable(each) && !each.path.includes("/"));
   if (rejected.length > 0) return `Can't open ${listFileNames(rejected)}. ${rejectionReason(rejected, formats)}`;
-  return files.some(isImportable) ? null : `Nothing to import in this folder. ${formats}`;
+  return files.some(isUsable) ? null : `Nothing to import in this folder. ${formats}`;
 }

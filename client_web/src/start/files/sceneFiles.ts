@@ -7,11 +7,14 @@ const LAYER_SUFFIXES = [".usd", ".usda", ".usdc"];
 export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".stl", ...LAYER_SUFFIXES, ".usdz", ".zip"];
 export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
 export const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".dds", ".tif", ".tiff", ".gif"];
-/** Suffixes of companion files. */
-export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
-
-/** Materials for the library; a .zip may be one, too. */
+/** Materials for the library, and layers of USD; a .zip may be one, too. */
 export const MATERIALX_SUFFIX = ".mtlx";
+/** Suffixes of companion files. */
+export const COMPANION_SUFFIXES = [".bin", ".mtl", MATERIALX_SUFFIX, ...IMAGE_SUFFIXES];
+/** Files that a USD layer may name, beside images and other layers. */
+const STAGE_SUFFIXES = [...LAYER_SUFFIXES, ".usdz", MATERIALX_SUFFIX, ...IMAGE_SUFFIXES, ...ENVIRONMENT_SUFFIXES];
+/** Longer layers are not searched for names. */
+const MAX_LAYER_BYTES = 16 << 20;
 export const MEASURED_SUFFIXES = [".binary", ".bsdf", ".brdf", ".btf", MATERIALX_SUFFIX];
 
 export interface SceneFile extends DroppedFile {
@@ -38,6 +41,7 @@ export const isMeasuredFile = ({ name }: File): boolean => endsWith(name, MEASUR
 /** True if a file is an image with display values. */
 export const isDisplayImage = ({ name }: File): boolean => endsWith(name, IMAGE_SUFFIXES);
 
+export const isLayer = ({ path }: DroppedFile) => endsWith(path, LAYER_SUFFIXES);
 export const isSceneFile = ({ path }: DroppedFile) => endsWith(path, SCENE_SUFFIXES);
 
 /** A file's name without folders and suffix. */
@@ -60,13 +64,26 @@ export function mergeFiles(current: readonly DroppedFile[], added: readonly Drop
   return [...new Map([...current, ...added].map((each) => [each.path, each])).values()];
 }
 
+/** True for maps that belong to a USD stage: its layers name them, or they lie in a folder that was dropped with it. */
+async function findStageMaps(files: readonly DroppedFile[]): Promise<(file: DroppedFile) => boolean> {
+  const layers = files.filter(isLayer);
+  const texts = await Promise.all(layers.map(({ file }) => file.slice(0, MAX_LAYER_BYTES).text()));
+  return ({ path, file }) =>
+    layers.length > 0 && (path.includes("/") || texts.some((text) => text.includes(file.name)));
+}
+
 export async function sortFiles(files: readonly DroppedFile[]): Promise<ImportSelection> {
-  const environments = files.filter(({ file }) => isEnvironment(file));
+  const isStageMap = await findStageMaps(files);
+  const environments = files.filter((each) => isEnvironment(each.file) && !isStageMap(each));
   const byPath = new Map(files.map((each) => [each.path.toLowerCase(), each]));
   const findFile = (path: string) => byPath.get(path.toLowerCase());
   const images = files.filter(({ path }) => endsWith(path, IMAGE_SUFFIXES));
-  const layers = files.filter(({ path }) => endsWith(path, LAYER_SUFFIXES));
-  const read = async (scene: DroppedFile) => ({ ...scene, ...(await findReferences(scene, findFile, images, layers)) });
+  const stageFiles = files.filter(({ path }) => endsWith(path, STAGE_SUFFIXES));
+  const read = async (scene: DroppedFile) => {
+    // binary layers cannot be searched for all names: all that a stage may consist of is sent
+    if (isLayer(scene)) return { ...scene, companions: stageFiles.filter((file) => file !== scene), missing: [] };
+    return { ...scene, ...(await findReferences(scene, findFile, images)) };
+  };
   const scenes = await Promise.all(files.filter(isSceneFile).map(read));
   scenes.sort((a, b) => a.path.localeCompare(b.path, undefined, { numeric: true }));
   return { scenes, environment: environments.at(-1)?.file ?? null };
