@@ -9,7 +9,7 @@ sparse E_d, interpolated, brings less than it harms (docs/free-camera.md#when-th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.lobe_sampling import lobe_of
 from relume.brdf.specular import is_mirror
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, RelumeError, ResultUnavailableError
@@ -28,8 +29,7 @@ from relume.live.fixed_camera.protocols import StaticViewFactory
 from relume.live.fixed_camera.view_images import material_documents
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.image_error import pixel_errors
-from relume.live.free_camera.lobe_terms import has_traced_lobe
-from relume.look import Look
+from relume.look import Look, TermLook
 from relume.look.glass import glass_of
 from relume.scene.model import Camera
 
@@ -133,18 +133,18 @@ def _direct_residual(
 
 
 def _direct_look(look: Look) -> Look:
-    """The look under direct light, in which mirrors and narrow lobes are black: they reflect light of all paths."""
+    """The look under direct light, without mirrors and narrow terms, which reflect light of all paths."""
     materials = {
-        name: material.model_copy(update={"terms": ()}) if _is_sharp(look, name) else material
+        name: material.model_copy(update={"terms": _broad_terms(material_documents(look, name))})
         for name, material in look.materials.items()
     }
     transport = look.transport.model_copy(update={"show": "direct"})
     return look.model_copy(update={"transport": transport, "materials": materials})
 
 
-def _is_sharp(look: Look, name: str) -> bool:
-    terms = material_documents(look, name)
-    return is_mirror(terms) or has_traced_lobe(terms)
+def _broad_terms(terms: Sequence[TermLook]) -> tuple[TermLook, ...]:
+    """Return the terms whose direct light needs no rays along their lobes."""
+    return () if is_mirror(terms) else tuple(term for term in terms if lobe_of(term) is None)
 
 
 class ExactImage(NamedTuple):

@@ -65,11 +65,11 @@ class Shader:
             np.zeros((stop - start, 3), np.float32) if self._base_radiance is None else self._base_radiance[start:stop]
         )
         out = np.array(base_radiance[..., None], order="C")
+        self._rays.add(start, stop, out)  # first: triangles are divided by all light of a point
         if self._diffuse is not None:
             out[:, :, 0] += self._diffuse.shade(self._receivers, start, stop)
         elif self._lights.num_lights:
             self._add_listed(start, stop, out)
-        self._rays.add(start, stop, out)
         for area_light in self._area_lights:
             self._add_area_light(area_light, start, stop, out)
         return (out - base_radiance[..., None]).transpose(0, 2, 1)

@@ -13,6 +13,7 @@ from relume.live.free_camera import shade_lobe_rays, shared_lobe_rays
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.static_view_jobs import StaticViewState, correction_job
+from relume.live.opened import fixed_views
 from relume.live.opened.openers import open_bake
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import complete, validate
@@ -26,6 +27,7 @@ CAMERA = make_camera("front", [0.4, 1.2, 3.2], [0, 0.45, 0], 0.7)
 SIZE = (48, 36)
 CHROME = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.05, "f0": 0.9}}
 RED = {"model": "lambert", "color": [0.8, 0.1, 0.1]}
+BRUSHED = {"model": "ashikhmin_shirley", "color": [1.0] * 3, "params": {"nu": 300.0, "nv": 1500.0, "f0": 0.07}}
 
 
 def bake_ball(folder, environment):
@@ -130,6 +132,32 @@ def test_the_residual_leaves_indirect_light_in_a_polished_surface(white, roughne
     picture.set_camera(CAMERA, size)
     picture.advance(None)
     np.testing.assert_allclose(picture.image(), before, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("narrow", [{**CHROME, "params": {"roughness": 0.1, "f0": 0.9}}, BRUSHED])
+def test_the_residual_corrects_what_lies_beneath_a_narrow_lobe_without_tracing_it(sunny, monkeypatch, narrow):
+    bake, builder = sunny
+    size = 2 * SIZE[0], 2 * SIZE[1]
+
+    def residual_of(terms):
+        look = look_with(bake, lambda document: document["materials"]["Ball"].update(terms=terms))
+        picture = FreeCameraPicture(bake, "front")
+        picture.set_camera(CAMERA, size)
+        view_state = StaticViewState(builder.make_static_view, bake.cache, (CAMERA, size), look, None)
+        applied = []
+        job = correction_job(view_state, picture, (0, 0), applied.append)
+        job.apply(job.run(lambda share: None, lambda: False))
+        return applied[0], picture.gbuffer
+
+    def refuse(*args):
+        raise AssertionError("the exact view traces these rays, in all light")
+
+    monkeypatch.setattr(fixed_views, "trace_lobes", refuse)
+    (diffuse, gbuffer), (both, _) = residual_of([RED]), residual_of([RED, narrow])
+    face = gbuffer.hits.face[: size[0] * size[1]]
+    is_ball = (face >= 0) & (bake.stored_scene.face_material[np.maximum(face, 0)] == 0)
+    assert abs(diffuse.reshape(-1, 3)[is_ball]).max() > 0.01
+    np.testing.assert_allclose(both, diffuse, atol=1e-6)
 
 
 @pytest.mark.parametrize("roughness", [0.01, 0.05, 0.2])
