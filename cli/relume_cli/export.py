@@ -47,7 +47,7 @@ def export(
     if len(looks) < len(named_looks):
         raise ParameterError("--look", [each.name for each in named_looks], "looks with different names")
     first, *others = looks.items()
-    prepared = prepare_export(loaded, first[1], dict(others))
+    prepared = prepare_export(loaded, first[1], dict(others), has_materials=file_format.has_materials)
     report = export_report(prepared, file_format)
     if not dry_run:
         file_format.write(prepared, output)

@@ -60,11 +60,14 @@ class ExportDocument:
                 yield name, light
 
 
-def prepare_export(scene: Scene, look: Look, variants: Mapping[str, Look] | None = None) -> ExportDocument:
+def prepare_export(
+    scene: Scene, look: Look, variants: Mapping[str, Look] | None = None, *, has_materials: bool = True
+) -> ExportDocument:
     """Convert a scene's materials, without writing anything.
 
     Args:
         scene: the scene. look: a complete look of it. variants: further complete looks of it by name.
+        has_materials: the file has materials; otherwise none are converted.
     Raises:
         ParameterError: there are too many variants. NotFoundError, SceneError: an image of a look is unavailable.
     """
@@ -72,6 +75,8 @@ def prepare_export(scene: Scene, look: Look, variants: Mapping[str, Look] | None
     if len(variants) > MAX_VARIANTS:
         raise ParameterError("variants", len(variants), f"at most {MAX_VARIANTS} looks")
     images = ExportImages()
+    if not has_materials:
+        return ExportDocument(scene, look, [], {name: [] for name in variants}, images)
     exporter = MaterialExporter(scene, images)
     by_variant = {name: exporter.materials(each) for name, each in variants.items()}
     return ExportDocument(scene, look, exporter.materials(look), by_variant, images)

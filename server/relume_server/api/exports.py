@@ -82,4 +82,5 @@ def _prepare(scene: str, request: ExportRequest, services: Services) -> ExportDo
 
     document = request.look if request.saved_look is None else saved(request.saved_look)
     variants = {name: look_of_scene(loaded, saved(name), f"look {name!r}") for name in request.variants}
-    return prepare_export(loaded, look_of_scene(loaded, document, "look"), variants)
+    has_materials = FORMATS[request.format].has_materials
+    return prepare_export(loaded, look_of_scene(loaded, document, "look"), variants, has_materials=has_materials)
