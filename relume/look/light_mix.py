@@ -31,7 +31,8 @@ def make_light_mix(look: Look, scene_name: str) -> dict[str, Any]:
         "format": FORMAT,
         "version": VERSION,
         "scene": scene_name,
-        "units": {name: UNITS[light.kind] for name, light in look.lights.items()},
+        "units": UNITS,
+        "kinds": {name: light.kind for name, light in look.lights.items()},
         "lights": {name: light.model_dump(mode="json", include=_FIELDS) for name, light in look.lights.items()},
         "environment": look.environment.model_dump(mode="json"),
     }
@@ -57,12 +58,11 @@ def expand_light_mix(document: Any, default: Mapping[str, Any]) -> tuple[Any, li
 
 
 def _expand_lights(mix: Mapping[str, Any], scene_lights: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    lights, units = _object(mix, "lights"), _object(mix, "units")
-    scene_units = {name: UNITS[light["kind"]] for name, light in scene_lights.items()}
+    lights, kinds = _object(mix, "lights"), _object(mix, "kinds")
     common = {name: light for name, light in lights.items() if name in scene_lights}
-    differing = {name for name in common if units.get(name, scene_units[name]) != scene_units[name]}
+    differing = {name for name in common if kinds.get(name, scene_lights[name]["kind"]) != scene_lights[name]["kind"]}
     for name in differing:
-        if isinstance(common[name], Mapping):
+        if isinstance(common[name], Mapping):  # 1 W/sr is not 1 W/m²
             common[name] = {field: value for field, value in common[name].items() if field != "emission"}
     warnings = []
     if missing := lights.keys() - common.keys():

@@ -52,7 +52,7 @@ def test_its_sections_are_a_partial_look_that_leaves_materials_alone(mix: Any) -
 
 def test_units_are_those_of_the_kinds(mix: Any) -> None:
     kinds = {name: light["kind"] for name, light in DEFAULT["lights"].items()}
-    assert mix["units"] == {name: UNITS[kind] for name, kind in kinds.items()}
+    assert (mix["kinds"], mix["units"]) == (kinds, UNITS)
     assert (UNITS["point"], UNITS["directional"], UNITS["mesh"]) == ("W/sr", "W/m²", "W/(sr·m²)")
 
 
@@ -105,7 +105,7 @@ def test_the_report_says_what_a_mix_does_not_restore() -> None:
     [
         ({"version": 2}, "/version is 2; give 1"),
         ({"lights": 3}, "/lights is 3"),
-        ({"units": []}, "/units is a list"),
+        ({"kinds": []}, "/kinds is a list"),
         ({"environment": "studio"}, "/environment"),
         ({"lights": dict.fromkeys(DEFAULT["lights"], 3)}, "/lights/"),
         ({"lights": {"Point": {"intensity": -1}}}, "/intensity is -1"),

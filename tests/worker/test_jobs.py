@@ -56,6 +56,17 @@ def test_clients_take_turns_and_small_jobs_go_first() -> None:
     assert [next_client(turns, waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
 
 
+def test_priorities_order_the_jobs_of_one_client_only() -> None:
+    turns = FairShare({})
+    waiting = [
+        Waiting("a1", "ann", False, 1.0),
+        Waiting("a2", "ann", False, 2.0, priority=5),
+        Waiting("a3", "ann", False, 3.0, priority=-5),
+        Waiting("b1", "bob", False, 4.0, priority=-10),
+    ]
+    assert [work.id for work in turns.sort(waiting)] == ["a2", "b1", "a1", "a3"]
+
+
 def test_client_who_returns_between_turns_keeps_its_share() -> None:
     turns = FairShare({})
     many, one = [Waiting(f"a{k}", "ann", False, k) for k in range(4)], Waiting("b", "bob", False, 9.0)

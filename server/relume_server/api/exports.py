@@ -16,9 +16,10 @@ from relume.core.errors import ParameterError
 from relume.core.folder_size import folder_bytes
 from relume.export.export_document import ExportDocument, look_of_scene, prepare_export
 from relume.export.export_scene import FORMATS, export_report
+from relume.output.file_names import safe_stem
 from relume.scene.scene_folder import load_scene
 from relume_server.auth.roles import CallerDep
-from relume_server.io.downloads import Download, safe_stem
+from relume_server.io.downloads import Download
 from relume_server.io.import_request import UPLOAD_PREFIX
 from relume_server.openapi import files
 from relume_server.persistence.look_store import check_name
