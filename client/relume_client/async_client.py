@@ -273,7 +273,11 @@ class AsyncBake(_AsyncJob[BakeBody]):
         timeout: float | None = None,
         **options: Unpack[RenderOptions],
     ) -> Path:
-        """Render looks into one PNG with their names; arguments as in `render`."""
+        """Render looks into one PNG with their names.
+
+        Args:
+            looks, view, options: as in `submit`. out: the file. progress, timeout: as in `wait`.
+        """
         render = await self.submit(looks, "contact_sheet", view=view, **options)
         await render.wait(progress=progress, timeout=timeout)
         return (await render.save(Path(out)))[0]

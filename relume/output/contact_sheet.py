@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
+import OpenImageIO
 from PIL import Image, ImageDraw, ImageFont
 
 from relume.core.errors import CancelledError
@@ -15,6 +17,8 @@ MAX_IMAGES = 400
 CELL_WIDTH = 320
 GAP = 12
 LABEL_HEIGHT = 24
+CELL_BYTES = 3 * (CELL_WIDTH + GAP) * (CELL_WIDTH + LABEL_HEIGHT + GAP)
+"""Upper bound of the size of one cell."""
 _FONT_SIZE = 14
 _PAPER, _INK = (32, 32, 32), (230, 230, 230)
 _MAX_LABEL = 400  # characters; more do not fit into a cell
@@ -58,19 +62,29 @@ def _arrange(thumbnails: Sequence[Image.Image], labels: Sequence[str]) -> Image.
     height = max(image.height for image in thumbnails)
     column, row = width + GAP, height + LABEL_HEIGHT + GAP
     sheet = Image.new("RGB", (GAP + num_columns * column, GAP + num_rows * row), _PAPER)
-    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(_FONT_SIZE)
+    draw, font = ImageDraw.Draw(sheet), _load_font()
     for index, (image, label) in enumerate(zip(thumbnails, labels, strict=True)):
         x, y = GAP + index % num_columns * column, GAP + index // num_columns * row
         sheet.paste(image, (x, y))
-        draw.text((x, y + height + 4), _fitting(label, width, font.getlength), _INK, font)
+        draw.text((x, y + height + 4), _fitting(label, width, font), _INK, font)
     return sheet
 
 
-def _fitting(label: str, width: int, measure: Callable[[str], float]) -> str:
-    """Shorten a label to a width in pixels."""
+def _load_font() -> ImageFont.FreeTypeFont:
+    """Return a font of the system with many alphabets, or OpenImageIO's with Western European letters."""
+    folder = Path(OpenImageIO.__file__).parent / "share" / "fonts" / "OpenImageIO"
+    for name in ("DejaVuSans.ttf", "Arial.ttf"):
+        with suppress(OSError):
+            return ImageFont.truetype(name, _FONT_SIZE)
+    return ImageFont.truetype(str(folder / "DroidSans.ttf"), _FONT_SIZE)
+
+
+def _fitting(label: str, width: int, font: ImageFont.FreeTypeFont) -> str:
+    """Shorten a label to a width in pixels; letters that the font does not have become question marks."""
     text = " ".join(label[:_MAX_LABEL].split())
-    if measure(text) <= width:
+    text = "".join(c if c == " " or font.getmask(c).getbbox() is not None else "?" for c in text)
+    if font.getlength(text) <= width:
         return text
-    while text and measure(text + "…") > width:
+    while text and font.getlength(text + "...") > width:
         text = text[:-1]
-    return text + "…"
+    return text + "..."

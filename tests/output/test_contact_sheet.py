@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFont
 
 from relume.core.errors import CancelledError, DiskFullError, RelumeError
 from relume.output.contact_sheet import CELL_WIDTH, GAP, LABEL_HEIGHT, write_contact_sheet
@@ -43,6 +43,33 @@ def test_small_and_transparent_images_and_long_names_stay_in_their_cells(tmp_pat
     assert sheet.shape == (2 * GAP + 30 + LABEL_HEIGHT, 3 * GAP + 80, 3)
     assert np.all(sheet[GAP : GAP + 30, GAP : GAP + 40] == PAPER)
     assert np.all(sheet[:, GAP + 40 : GAP + 40 + GAP // 2] == PAPER)
+
+
+@pytest.mark.parametrize("has_system_fonts", [False, True])
+def test_letters_of_other_languages_are_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_system_fonts: bool
+) -> None:
+    """With any font; what it does not have is a question mark, and not nothing."""
+    real = ImageFont.truetype
+
+    def load(name: str, size: int) -> ImageFont.FreeTypeFont:
+        if not has_system_fonts and not Path(name).is_absolute():
+            raise OSError("cannot open resource")
+        return real(name, size)
+
+    monkeypatch.setattr(ImageFont, "truetype", load)
+    letters = "aößé" + "灯?"
+    paths = images(tmp_path, *[(0, 0, 0)] * len(letters), size=(60, 40))
+    write_contact_sheet(paths, list(letters), tmp_path / "sheet.png")
+    sheet = np.array(Image.open(tmp_path / "sheet.png"))
+    row, column = 40 + LABEL_HEIGHT + GAP, 60 + GAP
+    labels = {
+        sheet[y + 40 + GAP : y + 40 + GAP + LABEL_HEIGHT, x : x + 60].tobytes()
+        for x in range(GAP, 3 * column, column)
+        for y in (0, row)
+    }
+    assert len(labels) >= len(letters) - 1
+    assert all(len(set(label)) > 1 for label in labels)
 
 
 def test_a_sheet_that_is_stopped_or_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

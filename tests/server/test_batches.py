@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import zipfile
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -150,6 +153,27 @@ def test_a_bake_that_is_deleted_fails_the_render_with_a_sentence(
     assert "bake" in body["problem"]
     assert client.get(f"{url}/frames/0").status_code == 200
     assert client.get(f"{url}/archive.zip?partial=true").status_code == 200
+
+
+def test_a_full_disk_leaves_no_half_file_and_the_rest_resumes(
+    client: TestClient, request_of: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill_disk(path: Path) -> None:
+        path.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("relume.output.contact_sheet._arrange", lambda *_: SimpleNamespace(save=fill_disk))
+    url = client.post("/api/renders", json=request_of | {"format": "contact_sheet"}).headers["location"]
+    body = wait_until(client, url, is_done)
+    assert body["state"] == "failed"
+    assert "the disk is full" in body["problem"]
+    assert client.get(f"{url}/contact-sheet.png").status_code == 409
+    (folder,) = (client.app.state.services.settings.data / "renders").iterdir()  # type: ignore[attr-defined]
+    assert {path.name for path in folder.iterdir()} == {"0000.png", "claim.txt"}
+    monkeypatch.undo()
+    assert client.post(f"{url}/resume").status_code == 202
+    assert wait_until(client, url, is_done)["state"] == "ready"
+    assert client.get(f"{url}/contact-sheet.png").status_code == 200
 
 
 def test_contact_sheet_has_all_images_with_names(client: TestClient, request_of: dict[str, Any]) -> None:

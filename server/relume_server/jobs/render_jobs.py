@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from relume.core.errors import NotFoundError
 from relume.core.filesystem import UNFINISHED
 from relume.core.folder_size import folder_bytes
+from relume.output.contact_sheet import CELL_BYTES
 from relume.output.file_names import safe_stem
 from relume_server.schemas.renders import RENDER_PLACEHOLDER, QueuedRender, RenderRequest
 from relume_worker.jobs.job import Job
@@ -57,12 +60,13 @@ class RenderJobs(JobKind[QueuedRender]):
         return request.priority
 
     def on_ready(self, identity: str) -> None:
-        """Notify who asked for it."""
-        self._notify(self.get(identity))
+        """Notify, unless it was deleted meanwhile."""
+        with suppress(NotFoundError):
+            self._notify(self.get(identity))
 
     def on_failed(self, identity: str) -> None:
-        """Notify who asked for it."""
-        self._notify(self.get(identity))
+        """Notify, unless it was deleted meanwhile."""
+        self.on_ready(identity)
 
     def frame_path(self, job: RenderJob, index: int) -> Path:
         """File of one image, existing or not."""
@@ -169,7 +173,8 @@ def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int
     channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
     aov_bytes = _AOV_BYTES * request.aovs
     picture_bytes = size[0] * size[1] * (3 * channel_bytes * num_layers + aov_bytes)
-    return 2 * len(request.frame_indices) * (picture_bytes + HEAD_BYTES)
+    sheet_bytes = CELL_BYTES * (request.format == "contact_sheet")
+    return len(request.frame_indices) * (2 * (picture_bytes + HEAD_BYTES) + sheet_bytes)
 
 
 def ended_message(job: RenderJob) -> bytes:

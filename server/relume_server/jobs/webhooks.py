@@ -125,7 +125,8 @@ class Webhooks:
             try:
                 self._post(url, body)
             except (_UndeliveredError, OSError, HTTPException, ValueError) as error:
-                reason = str(error) or type(error).__name__
+                is_own_text = isinstance(error, _UndeliveredError | OSError)  # others may quote the target
+                reason = str(error) if is_own_text else type(error).__name__
             else:
                 return
         parts = _split(url)
