@@ -54,5 +54,5 @@ def format_of(path: Path) -> ExportFormat:
 
 def export_report(export: ExportDocument, file_format: ExportFormat) -> ExportReport:
     """Return the errors of an export, and what its file will not have."""
-    omitted = file_format.omitted(export)
+    omitted = export.warnings + file_format.omitted(export)
     return make_report(export, omitted + omitted_from_scene_files(export) if file_format.has_materials else omitted)
