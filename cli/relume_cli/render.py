@@ -147,10 +147,12 @@ def _check(
     mixes = (expand_light_mix(each, default)[1] for planned_file in planned_files for each in planned_file.documents)
     for warning in dict.fromkeys(warning for mix in mixes for warning in mix):
         note(f"warning: {warning}")
-    for planned_file in planned_files if animation_plan is not None else ():
-        animation, _ = check_animation_plan(source, planned_file, animation_plan)
-        if (material := crossed_material(animation, planned_file.view, source.transfer)) is not None:
-            note(f"note: the turntable passes through {material!r}; frames behind it show it from outside")
+    if animation_plan is not None:
+        for planned_file in planned_files:
+            view_source = source._replace(view=planned_file.view)
+            animation, _ = check_animation_plan(view_source, planned_file, animation_plan)
+            if (material := crossed_material(animation, planned_file.view, source.transfer)) is not None:
+                note(f"note: the turntable passes through {material!r}; frames behind it show it from outside")
     common = {"scene": source.scene.id, "bake": source.bake.id}
     return [
         {

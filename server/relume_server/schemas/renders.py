@@ -146,11 +146,11 @@ class RenderRequest(Animation):
     looks while moving, about a hundred times faster.
     """
 
-    looks: Annotated[list[dict[str, Any]], Field(default_factory=list, max_length=MAX_LOOKS)]
-    look_names: Annotated[list[Name], Field(default_factory=list, max_length=MAX_LOOKS)]
-    saved_looks: Annotated[list[Name], Field(default_factory=list, max_length=MAX_LOOKS)]
+    looks: list[dict[str, Any]] = Field(default_factory=list, max_length=MAX_LOOKS)
+    look_names: list[Name] = Field(default_factory=list, max_length=MAX_LOOKS)
+    saved_looks: list[Name] = Field(default_factory=list, max_length=MAX_LOOKS)
     view: Name | None = None
-    views: Annotated[list[BakeView], Field(default_factory=list, max_length=MAX_VIEWS)]
+    views: list[BakeView] = Field(default_factory=list, max_length=MAX_VIEWS)
     format: RenderFormat
     size: tuple[Side, Side] | None = None
     name: Name | None = None
@@ -169,7 +169,7 @@ class RenderRequest(Animation):
     @property
     def picture_format(self) -> ImageFormat:
         """Image format of a single frame."""
-        return "png" if self.format in ("mp4", "contact_sheet") else self.format
+        return "png" if self.format == "mp4" or self.format == "contact_sheet" else self.format
 
     @property
     def is_animation(self) -> bool:
@@ -204,9 +204,9 @@ class QueuedRender(RenderRequest):
     is not as in the looks.
     """
 
-    file_names: Annotated[list[str], Field(default_factory=list)]
-    labels: Annotated[list[str], Field(default_factory=list)]
-    warnings: Annotated[list[str], Field(default_factory=list)]
+    file_names: list[str] = Field(default_factory=list)
+    labels: list[str] = Field(default_factory=list)
+    warnings: list[str] = Field(default_factory=list)
 
 
 RENDER_PLACEHOLDER = QueuedRender(bake="0" * 16, view="unknown", looks=[{}], format="png")
