@@ -33,7 +33,9 @@ function ReportList({ report, isMix }: { report: ExportReportBody | Error | null
   if (report === null) return <p role="status">{isMix ? "Reading lights…" : "Fitting materials…"}</p>;
   if (report instanceof Error) return <p role="alert">{report.message}</p>;
   const lines = reportLines(report);
-  const complete = isMix ? "The file has all lights, without materials." : "The file has everything that the look shows.";
+  const complete = isMix
+    ? "The file has all lights, without materials."
+    : "The file has everything that the look shows.";
   if (lines.length === 0) return <p role="status">{complete}</p>;
   return (
     <ul role="status" aria-label="Differences">
