@@ -22,10 +22,10 @@ def resolve_looks(request: RenderRequest, store: LookStore, max_bytes: int) -> Q
     num_looks = len(request.looks) + len(request.saved_looks)
     if not 1 <= num_looks <= MAX_LOOKS:
         value = Description(f"a list of {num_looks} looks, with saved_looks")
-        raise ParameterError("looks", value, f"1 to {MAX_LOOKS:,} looks")
+        raise ParameterError("/looks", value, f"1 to {MAX_LOOKS:,} looks")
     if len(request.look_names) > len(request.looks):
         value = Description(f"a list of {len(request.look_names)} names")
-        raise ParameterError("look_names", value, f"at most one per look, {len(request.looks)} in total")
+        raise ParameterError("/look_names", value, f"at most one per look, {len(request.looks)} in total")
     names = [check_name(name) for name in request.saved_looks]
     documents = _saved_documents(names, store, max_bytes)
     unnamed = range(len(request.look_names), len(request.looks))
@@ -41,7 +41,7 @@ def _saved_documents(names: list[str], store: LookStore, max_bytes: int) -> list
         num_bytes += len(text)
         if num_bytes > max_bytes:
             value = Description(f"a list of looks with more than {bytes_text(max_bytes)}")
-            raise ParameterError("saved_looks", value, "fewer of them, in several renders")
+            raise ParameterError("/saved_looks", value, "fewer of them, in several renders")
         documents.append(json.loads(text))
     return documents
 
@@ -59,15 +59,15 @@ def check_views(request: QueuedRender) -> None:
     """Check that a batch has views, and that all its parts are of a batch with so many. Raises ParameterError."""
     if (request.view is None) == (not request.views):
         value = None if request.view is None else request.view
-        raise ParameterError("view", value, "either view, or a list of views")
+        raise ParameterError("/view", value, "either view, or a list of views")
     if len(request.views) > 1 and request.format == "mp4":
-        raise ParameterError("format", "mp4", "one view, because a video has one")
+        raise ParameterError("/format", "mp4", "one view, because a video has one")
     if len(request.views) > 1 and isinstance(request.path, CameraPath):
         value = Description(f"a list of {len(request.views)} views")
-        raise ParameterError("views", value, "one view, because the cameras of path are those of one")
+        raise ParameterError("/views", value, "one view, because the cameras of path are those of one")
     if request.frame_step > 1 and not request.is_animation:
-        raise ParameterError("frame_step", request.frame_step, "1, or frames or path for an animation")
+        raise ParameterError("/frame_step", request.frame_step, "1, or frames or path for an animation")
     limit = MAX_IMAGES if request.format == "contact_sheet" else MAX_FRAMES
     if request.num_images > limit:
         value = Description(f"{request.num_images:,} images in {len(request.bake_views)} views")
-        raise ParameterError("frames", value, f"at most {limit:,} images in total")
+        raise ParameterError("/frames", value, f"at most {limit:,} images in total")

@@ -36,7 +36,7 @@ def label_images(request: QueuedRender) -> list[str]:
 def _template(request: QueuedRender) -> FileTemplate:
     suffix = f".{request.picture_format}"
     if request.file_name is not None:
-        return parse_portable_template("file_name", request.file_name, suffix)
+        return parse_portable_template("/file_name", request.file_name, suffix)
     text = safe_stem(request.name or request.view or "picture")
     if len({bake for bake, _ in request.bake_views}) > 1:
         text += "-{bake}"
@@ -44,7 +44,7 @@ def _template(request: QueuedRender) -> FileTemplate:
         text += "-{view}"
     if len(request.frame_indices) > 1:
         text += "-{frame:04}"
-    return parse_portable_template("file_name", text, suffix)
+    return parse_portable_template("/file_name", text, suffix)
 
 
 def _fields(request: QueuedRender, scene_names: Mapping[str, str], index: int) -> FileFields:

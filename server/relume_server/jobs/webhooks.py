@@ -104,13 +104,13 @@ class Webhooks:
         if url is None:
             return
         if self._hosts == WebhookHosts(frozenset(), ()):
-            raise ParameterError("webhook", url, "none, because this server allows no hosts (RELUME_WEBHOOK_HOSTS)")
+            raise ParameterError("/webhook", url, "none, because this server allows no hosts (RELUME_WEBHOOK_HOSTS)")
         parts = _split(url)
         if parts is None:
-            raise ParameterError("webhook", url, "an http or https address with a host, without user and fragment")
+            raise ParameterError("/webhook", url, "an http or https address with a host, without user and fragment")
         if not self._hosts.allows_host(_host(parts)):
             allowed = "an address with a host that this server allows (RELUME_WEBHOOK_HOSTS)"
-            raise ParameterError("webhook", Description(f"of host {_host(parts)[:80]!r}"), allowed)
+            raise ParameterError("/webhook", Description(f"of host {_host(parts)[:80]!r}"), allowed)
 
     def send(self, url: str, body: bytes) -> None:
         """Send a JSON document in the background; a failure is logged."""

@@ -22,7 +22,7 @@ const quoted = (names: readonly string[]) => names.map((name) => `“${name}”`
 /** The look with the lights and the environment of a light mix, and a sentence for each thing that it does not have. */
 export function withLightMix(current: Look, mix: Fields): { look: Look; notes: string[] } {
   if (mix["version"] !== 1) throw new Error("This light mix is of another version of relume. Update relume.");
-  const [mixed, kinds] = ["lights", "kinds"].map((name) => (isFields(mix[name]) ? (mix[name] as Fields) : {}));
+  const [mixed, kinds] = ["lights", "kinds"].map((name) => (isFields(mix[name]) ? mix[name] : {}));
   const lights: Record<string, unknown> = { ...current.lights };
   const differing: string[] = [];
   for (const [name, fields] of Object.entries(mixed ?? {})) {
@@ -55,7 +55,7 @@ export function readLookFile(current: Look, text: string): { look: Look; notes: 
     !Object.entries(document).every(([name, part]) => SECTIONS.includes(name) && isFields(part))
   )
     throw new Error("This file is neither a look nor a light mix.");
-  return { look: completeLook(document as Partial<Look>), notes: [] };
+  return { look: completeLook(document), notes: [] };
 }
 
 /** Apply a dropped file. */
