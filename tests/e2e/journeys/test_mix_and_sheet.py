@@ -44,8 +44,10 @@ def test_light_mix_and_contact_sheet(editor: Editor, tmp_path: Path) -> None:
     assert np.abs(editor.pixels() - dimmed).max() <= 1
 
     page.get_by_role("button", name="Save look").click()
-    page.keyboard.press("Enter")
-    expect(page.get_by_text("Save a look first")).to_have_count(0)
+    name = page.get_by_role("textbox", name="New name of")
+    expect(name).to_be_focused()
+    name.press("Enter")
+    expect(page.get_by_role("button", name="Rename Look").first).to_be_visible()
     page.get_by_role("button", name="More export formats").press("Enter")
     with page.expect_download(timeout=WAIT_MS) as download:
         page.get_by_role("button", name="Contact sheet").press("Enter")
