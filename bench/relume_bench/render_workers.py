@@ -19,7 +19,7 @@ from relume_bench.workers import bake_s
 from relume_server.batch.cluster_steps import ClusterSteps
 from relume_server.batch.worker_process import ProcessSettings
 from relume_server.jobs.render_jobs import RenderJobs
-from relume_server.schemas.renders import RenderRequest
+from relume_server.schemas.renders import QueuedRender
 from relume_worker.executor import num_cores
 from relume_worker.jobs.job import Quota
 from relume_worker.jobs.job_ledger import JobLedger
@@ -71,7 +71,7 @@ def _batch_s(service: BakeService, bake: str, view: str, frames: int) -> float:
 def _render_s(renders: RenderJobs, bake: str, view: str, rotations: list[float]) -> float:
     looks = [{"environment": {"rotation": rotation}} for rotation in rotations]
     start_time = time.perf_counter()
-    identity = renders.submit(RenderRequest(bake=bake, view=view, looks=looks, format="png"))
+    identity = renders.submit(QueuedRender(bake=bake, view=view, looks=looks, format="png"))
     while (job := renders.get(identity)).state != "ready":
         if job.state == "failed":
             raise PlanError(f"the batch failed: {job.problem}")

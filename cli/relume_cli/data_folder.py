@@ -47,7 +47,8 @@ def open_settings(data: Path | None, **overrides: Any) -> Settings:
         first = error.errors()[0]
         field, *within = map(str, first["loc"])
         name = ".".join((f"RELUME_{field.upper()}", *within))
-        raise ParameterError(name, first["input"], describe_allowed(first["loc"], [first])) from None
+        value = Description("not usable") if field.endswith("_secret") else first["input"]
+        raise ParameterError(name, value, describe_allowed(first["loc"], [first])) from None
     except SettingsError as error:  # names the field only in its message
         variable = "RELUME_" + "".join(str(error).split('"')[1:2]).upper()
         allowed = """JSON, as '["10.0.0.5"]' or '{"Ann": "edit"}', quoted for the shell"""

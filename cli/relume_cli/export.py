@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,10 +24,11 @@ def export(
     """Export a scene with a look.
 
     The first --look is that of the file, by default the scene's own; further ones become material variants. Materials
-    that the format cannot express are fitted; a warning gives the error of each.
+    that the format cannot express are fitted; a warning gives the error of each. A file name ending in .json is a light
+    mix: brightness and color of the lights by name.
     """
     from relume.core.errors import ParameterError
-    from relume.export.export_document import look_of_scene, prepare_export
+    from relume.export.export_document import light_mix_warnings, look_of_scene, prepare_export
     from relume.export.export_scene import export_report, format_of
     from relume_cli.data_folder import find_scene, open_bakes, open_settings
     from relume_cli.pictures.looks import read_looks
@@ -47,7 +49,8 @@ def export(
     if len(looks) < len(named_looks):
         raise ParameterError("--look", [each.name for each in named_looks], "looks with different names")
     first, *others = looks.items()
-    prepared = prepare_export(loaded, first[1], dict(others))
+    prepared = prepare_export(loaded, first[1], dict(others), has_materials=file_format.has_materials)
+    prepared = replace(prepared, warnings=light_mix_warnings(loaded, [each.document for each in named_looks]))
     report = export_report(prepared, file_format)
     if not dry_run:
         file_format.write(prepared, output)

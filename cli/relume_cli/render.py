@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from relume_cli.options import BakeName, Data, DryRun, View
+from relume_cli.options import BakeName, Data, DryRun
 from relume_cli.pictures.looks import Looks
 from relume_cli.pictures.plans import Between, TurntableSubject
 from relume_cli.terminal.printing import Json, note, print_result
@@ -28,12 +28,14 @@ def render(
         Path,
         typer.Option(
             metavar="FILE.exr|.png|.webp",
-            help="Image file to write; {look} in it stands for the name of each look. "
-            "Turntable or animation: a folder, or FILE.mp4.",
+            help="Image file to write; {look}, {view}, {scene}, {bake} and {frame:04} in its name stand for those of "
+            "each image. Turntable or animation: a name with {frame}, a folder, or FILE.mp4.",
         ),
     ],
     look: Looks = None,
-    view: View = None,
+    view: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="View; repeat for several. [default: the first]")
+    ] = None,
     layers: Annotated[bool, typer.Option("--layers", help="EXR: add one layer per light and per light path.")] = False,
     light_groups: Annotated[
         bool, typer.Option("--light-groups", help="EXR: add direct and indirect layers per light.")
@@ -65,6 +67,13 @@ def render(
         ),
     ] = None,
     fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames per second. [default: 25]")] = None,
+    start: Annotated[int, typer.Option(metavar="N", min=0, max=10**8, help="Number of the first frame.")] = 0,
+    step: Annotated[
+        int | None, typer.Option(metavar="N", min=1, max=3600, help="Animation: render only every N-th frame.")
+    ] = None,
+    contact_sheet: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Also write one PNG with all images and their names.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Skip files that exist.")] = False,
     approximate: Annotated[
         bool, typer.Option("--approximate", help="Free camera: render the approximate image shown while it moves.")
@@ -77,14 +86,16 @@ def render(
 
     Prints the names of the written files.
     """
+    from relume.output.file_names import FileFields
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.pictures.files import exr_options
     from relume_cli.pictures.looks import read_looks
-    from relume_cli.pictures.plans import check_target, make_animation_plan, plan_files
+    from relume_cli.pictures.plans import check_frames, check_keyframes, check_target, make_animation_plan, plan_files
+    from relume_cli.pictures.write_sheet import check_sheet, write_sheet
     from relume_server.persistence.look_store import LookStore
 
-    animation_plan = make_animation_plan(turntable, rotate, frames, between, fps)
-    check_target(output, animation_plan, resumes=resume)
+    animation_plan = make_animation_plan(turntable, rotate, frames, between, fps, step)
+    check_target(output, animation_plan)
     exr = exr_options(
         output,
         layers=layers,
@@ -95,17 +106,25 @@ def render(
     )
     service = open_bakes(open_settings(data))
     try:
-        planned_files = plan_files(read_looks(look or (), LookStore(service.ledger.sessions)), output, animation_plan)
-        source = _open(
+        named_looks = read_looks(look or (), LookStore(service.ledger.sessions))
+        if animation_plan is not None:
+            check_keyframes(len(named_looks), animation_plan)
+        source, views = _open(
             service,
             bake,
-            view,
+            view or (),
             is_free_camera=animation_plan is not None and animation_plan.subject in ("camera", "object"),
             approximate=approximate,
         )
+        fields = FileFields(source.scene.name, source.bake.id, source.view, "", start)
+        planned_files = plan_files(named_looks, output, animation_plan, fields, views)
+        for planned_file in planned_files if animation_plan is not None else ():
+            check_frames(planned_file, resumes=resume)
+        check_sheet(contact_sheet, planned_files)
         documents = _check(source, planned_files, animation_plan)
         if not dry_run:
             _write(source, planned_files, animation_plan, exr, resumes=resume)
+            write_sheet(contact_sheet, planned_files)
     finally:
         service.close()
     for planned_file, document in zip(planned_files, documents, strict=True):
@@ -116,23 +135,34 @@ def _check(
     source: RenderSource, planned_files: Sequence[PlannedFile], animation_plan: AnimationPlan | None
 ) -> list[dict[str, Any]]:
     """Return the files to write, as JSON. Raises ParameterError if a look or the animation is invalid."""
+    from relume.look.light_mix import expand_light_mix
     from relume_cli.pictures.plans import complete_plan
     from relume_cli.pictures.write_images import check_animation_plan
     from relume_server.batch.frame_sequence import crossed_material
 
-    view = source.transfer.views[source.view]
     default = source.transfer.default_look
     looks = [look for planned_file in planned_files for look in complete_plan(planned_file, default)]
     if any(look.environment.map is not None for look in looks):
         note("note: this environment was not baked, so shadows of small light sources are approximate")
+    mixes = (expand_light_mix(each, default)[1] for planned_file in planned_files for each in planned_file.documents)
+    for warning in dict.fromkeys(warning for mix in mixes for warning in mix):
+        note(f"warning: {warning}")
     if animation_plan is not None:
-        animation, _ = check_animation_plan(source, planned_files[0], animation_plan)
-        if (material := crossed_material(animation, source.view, source.transfer)) is not None:
-            note(f"note: the turntable passes through {material!r}; frames behind it show it from outside")
-    common = {"scene": source.scene.id, "bake": source.bake.id, "view": source.view, "size": [view.width, view.height]}
-    frames = 1 if animation_plan is None else animation_plan.frames
+        for planned_file in planned_files:
+            view_source = source._replace(view=planned_file.view)
+            animation, _ = check_animation_plan(view_source, planned_file, animation_plan)
+            if (material := crossed_material(animation, planned_file.view, source.transfer)) is not None:
+                note(f"note: the turntable passes through {material!r}; frames behind it show it from outside")
+    common = {"scene": source.scene.id, "bake": source.bake.id}
     return [
-        {"path": str(planned_file.path), "look": planned_file.look, **common, "frames": frames}
+        {
+            "path": str(planned_file.path),
+            "look": planned_file.look,
+            **common,
+            "view": planned_file.view,
+            "size": [source.transfer.views[planned_file.view].width, source.transfer.views[planned_file.view].height],
+            "frames": max(1, len(planned_file.frames)),
+        }
         for planned_file in planned_files
     ]
 
@@ -151,22 +181,21 @@ def _write(
     from relume_cli.terminal.progress import progress, report_part
 
     with progress("render") as report:
-        if animation_plan is not None:
-            write_animation(source, planned_files[0], animation_plan, report)
-            return
         for number, planned_file in enumerate(planned_files):
+            view_source = source._replace(view=planned_file.view)
             detail = f"{planned_file.look}, {number + 1} of {len(planned_files)}" if len(planned_files) > 1 else ""
-            if not (resumes and planned_file.path.exists()):
+            report_file = report_part(report, number, len(planned_files), detail)
+            if animation_plan is not None:
+                write_animation(view_source, planned_file, animation_plan, exr, report_file)
+            elif not (resumes and planned_file.path.exists()):
                 (look,) = complete_plan(planned_file, source.transfer.default_look)
-                write_picture(
-                    source, look, planned_file.path, exr, report_part(report, number, len(planned_files), detail)
-                )
+                write_picture(view_source, look, planned_file.path, exr, report_file)
 
 
 def _open(
-    service: BakeService, bake: str, view: str | None, *, is_free_camera: bool, approximate: bool
-) -> RenderSource:
-    """Open a bake, and note the limits of its images."""
+    service: BakeService, bake: str, views: Sequence[str], *, is_free_camera: bool, approximate: bool
+) -> tuple[RenderSource, list[str]]:
+    """Open a bake with all views, and note the limits of its images; return it with the names of the views."""
     from relume.core.cache import Cache
     from relume.live.opened.free_camera_transfer import BakedFreeCamera
     from relume.live.opened.openers import open_bake
@@ -176,7 +205,9 @@ def _open(
     from relume_worker.storage import open_cached
     from relume_worker.tasks import load_registered_scene
 
-    scene, bake_status, view_name = find_bake_and_view(service, bake, view, is_free_camera=is_free_camera)
+    first, *others = views or (None,)
+    scene, bake_status, view_name = find_bake_and_view(service, bake, first, is_free_camera=is_free_camera)
+    view_names = [view_name, *(find_bake_and_view(service, bake_status.id, other)[2] for other in others)]
     transfer = open_cached(service.store_path(bake_status.id), lambda store: open_bake(store, Cache(4 << 30)))
     if not bake_status.is_current:
         note(f"note: another version of relume made this bake; update it: relume bake {scene.id}")
@@ -192,6 +223,5 @@ def _open(
     def find_static_views() -> StaticViewBuilder:
         return StaticViewBuilder.from_bake(transfer, load_scene())
 
-    return RenderSource(
-        scene, bake_status, view_name, transfer, load_scene, None if is_approximate else find_static_views
-    )
+    find_views = None if is_approximate else find_static_views
+    return RenderSource(scene, bake_status, view_name, transfer, load_scene, find_views), view_names

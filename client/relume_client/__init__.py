@@ -6,7 +6,7 @@
 from relume_client.async_client import AsyncBake, AsyncClient, AsyncRender, AsyncScene
 from relume_client.async_session import AsyncSession
 from relume_client.cameras import look_at
-from relume_client.client import Bake, Client, Scene, Session
+from relume_client.client import Bake, Client, Render, Scene, Session
 from relume_client.errors import (
     AccessError,
     EditRejectedError,
@@ -32,6 +32,7 @@ __all__ = [
     "Look",
     "ProblemError",
     "RelumeClientError",
+    "Render",
     "Scene",
     "ServerUnavailableError",
     "ServerVersionError",

@@ -109,6 +109,10 @@ class AsyncClient:
         """A scene by its id."""
         return AsyncScene(self._transport, await self._transport.json("GET", f"/api/scenes/{quote(id, '')}"))
 
+    async def render(self, id: str) -> AsyncRender:  # noqa: A002
+        """A render by its id."""
+        return AsyncRender(self._transport, await self._transport.json("GET", f"/api/renders/{quote(id, '')}"))
+
     async def bake(self, id: str) -> AsyncBake:  # noqa: A002
         """A bake by its id."""
         return AsyncBake(self._transport, await self._transport.json("GET", f"/api/bakes/{quote(id, '')}"))
@@ -210,16 +214,17 @@ class AsyncBake(_AsyncJob[BakeBody]):
     async def submit(
         self, looks: Looks, image_format: str, *, view: str | None = None, **options: Unpack[RenderOptions]
     ) -> AsyncRender:
-        """Queue exact images of looks; see `render`.
+        """Queue exact images of looks, and do not wait; see `render`.
 
         Args:
-            looks: one or several; with `frames`, keyframes of an animation.
-            image_format: `exr`, `png`, `webp` or `mp4`.
-            view: name of a view; by default the first.
-            options: fields of the request, as in docs/api.md: `frames`, `path`, `size`, `layers`, `fps` and others.
+            looks: one or several, or none if there are `saved_looks`; with `frames`, keyframes of an animation.
+            image_format: `exr`, `png`, `webp`, `mp4` or `contact_sheet`.
+            view: name of a view; by default the first, unless there are `views`.
+            options: fields of the request, as in docs/api.md: `saved_looks`, `views`, `file_name`, `priority`,
+                `frames`, `path`, `size`, `layers`, `fps` and others.
         """
         documents = [looks] if isinstance(looks, Mapping | Look) else list(looks)
-        name = self.info["recipe"]["views"][0] if view is None else view
+        name = self.info["recipe"]["views"][0] if view is None and not options.get("views") else view
         request = to_json({"bake": self.id, "looks": documents, "format": image_format, "view": name, **options})
         return AsyncRender(self._transport, await self._transport.json("POST", "/api/renders", body=request))
 
@@ -238,21 +243,44 @@ class AsyncBake(_AsyncJob[BakeBody]):
         Args:
             looks: one or several, perhaps partial; with `frames`, keyframes of an animation.
             out: a file, whose ending is the format (.png, .exr, .webp, .mp4); with several images, {} in its name
-                becomes their number from 0. Folders are made.
+                becomes their number from 0. With `file_name`, a folder for files of these names, whose format is the
+                ending of `file_name`. Folders are made.
             view, options: as in `submit`. progress, timeout: as in `wait`.
         Returns:
             The files, in order.
         Raises:
             ValueError: the file's ending is no format, or several images have one name; before anything is rendered.
         """
-        target = Path(out)
-        format_name = _format(target)
+        target, template = Path(out), options.get("file_name")
+        format_name = _format(target if template is None else Path(template))
         render = await self.submit(looks, format_name, view=view, **options)
+        if template is not None:
+            await render.wait(progress=progress, timeout=timeout)
+            return await render.save_named(target)
         if render.info["total"] > 1 and format_name != "mp4" and "{}" not in str(out):
             await render.delete()
             raise ValueError(f"{render.info['total']} images need {{}} in their name, such as 'image_{{}}.png'")
         await render.wait(progress=progress, timeout=timeout)
         return await render.save(target)
+
+    async def contact_sheet(
+        self,
+        looks: Looks,
+        out: str | os.PathLike[str],
+        *,
+        view: str | None = None,
+        progress: Progress = False,
+        timeout: float | None = None,
+        **options: Unpack[RenderOptions],
+    ) -> Path:
+        """Render looks into one PNG with their names.
+
+        Args:
+            looks, view, options: as in `submit`. out: the file. progress, timeout: as in `wait`.
+        """
+        render = await self.submit(looks, "contact_sheet", view=view, **options)
+        await render.wait(progress=progress, timeout=timeout)
+        return (await render.save(Path(out)))[0]
 
     async def images(
         self, looks: Looks, *, view: str | None = None, timeout: float | None = None, **options: Unpack[RenderOptions]
@@ -286,14 +314,18 @@ class AsyncRender(_AsyncJob[RenderBody]):
         return await self._transport.read(f"/api/renders/{self.id}/frames/{index}")
 
     async def save(self, target: Path) -> list[Path]:
-        """Download all images; {} in the name of the target becomes their number. A video is one file."""
-        if self.info["format"] == "mp4":
-            await self._transport.download(f"/api/renders/{self.id}/video.mp4", target)
-            return [target]
+        """Download all images; {} in the name of the target becomes their number. Videos and sheets are one file."""
+        if single := {"mp4": "video.mp4", "contact_sheet": "contact-sheet.png"}.get(self.info["format"]):
+            return [await self._transport.download(f"/api/renders/{self.id}/{single}", target)]
         files = [Path(str(target).replace("{}", f"{index:04}")) for index in range(self.info["total"])]
         for index, file in enumerate(files):
             await self._transport.download(f"/api/renders/{self.id}/frames/{index}", file)
         return files
+
+    async def save_named(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Download all images into a folder, with the names of the render."""
+        paths = [f"/api/renders/{self.id}/frames/{index}" for index in range(self.info["total"])]
+        return [await self._transport.download(path, None, Path(folder)) for path in paths]
 
     async def delete(self) -> None:
         """Delete the render and its images."""

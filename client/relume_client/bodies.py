@@ -77,6 +77,13 @@ class BakeOptions(TypedDict):
     relightable: NotRequired[bool]
 
 
+class BakeView(TypedDict):
+    """A view of a bake; `bake` null: that of the request."""
+
+    view: str
+    bake: NotRequired[str | None]
+
+
 class CameraBody(TypedDict):
     """A camera that a user placed, by name."""
 
@@ -489,9 +496,12 @@ class RenderBody(TypedDict):
     name: str | None
     user: str
     bake: str
-    view: str
-    format: Literal["exr", "png", "webp", "mp4"]
+    view: str | None
+    views: Sequence[BakeView]
+    format: Literal["exr", "png", "webp", "mp4", "contact_sheet"]
     size: Sequence[int] | None
+    priority: int
+    warnings: Sequence[str]
     state: Literal["queued", "running", "ready", "failed", "canceled"]
     created: str
     started: str | None
@@ -510,8 +520,16 @@ class RenderOptions(TypedDict):
     durations: NotRequired[Sequence[float] | None]
     interpolation: NotRequired[Literal["parameters", "map", "map_low"]]
     path: NotRequired[Turntable | CameraPath | None]
+    look_names: NotRequired[Sequence[str]]
+    saved_looks: NotRequired[Sequence[str]]
+    views: NotRequired[Sequence[BakeView]]
     size: NotRequired[Sequence[int] | None]
     name: NotRequired[str | None]
+    file_name: NotRequired[str | None]
+    start_frame: NotRequired[int]
+    frame_step: NotRequired[int]
+    priority: NotRequired[int]
+    webhook: NotRequired[str | None]
     layers: NotRequired[bool | Literal["light_groups"]]
     aovs: NotRequired[bool]
     precision: NotRequired[Literal["half", "float"]]

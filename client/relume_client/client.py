@@ -17,7 +17,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from relume_client.async_client import AnyLook, AsyncBake, AsyncClient, AsyncScene, Looks, Progress
+from relume_client.async_client import AnyLook, AsyncBake, AsyncClient, AsyncRender, AsyncScene, Looks, Progress
 from relume_client.async_session import AsyncSession, Encoding, FrameListener
 from relume_client.bodies import (
     BakeBody,
@@ -25,6 +25,7 @@ from relume_client.bodies import (
     HelloMessage,
     ImportOptions,
     ModelBody,
+    RenderBody,
     RenderOptions,
     SceneBody,
     ViewInfo,
@@ -146,6 +147,10 @@ class Client:
         """A scene by its id."""
         return Scene(self._thread, self._thread.run(self._client.scene(id)))
 
+    def render(self, id: str) -> Render:  # noqa: A002
+        """A render by its id."""
+        return Render(self._thread, self._thread.run(self._client.render(id)))
+
     def bake(self, id: str) -> Bake:  # noqa: A002
         """A bake by its id."""
         return Bake(self._thread, self._thread.run(self._client.bake(id)))
@@ -223,6 +228,26 @@ class Bake:
         call = self._bake.render(looks, out, view=view, progress=progress, timeout=timeout, **options)
         return self._thread.run(call)
 
+    def submit(
+        self, looks: Looks, image_format: str, *, view: str | None = None, **options: Unpack[RenderOptions]
+    ) -> Render:
+        """Queue exact images of looks, and do not wait. See `AsyncBake.submit`."""
+        return Render(self._thread, self._thread.run(self._bake.submit(looks, image_format, view=view, **options)))
+
+    def contact_sheet(
+        self,
+        looks: Looks,
+        out: str | os.PathLike[str],
+        *,
+        view: str | None = None,
+        progress: Progress = False,
+        timeout: float | None = None,
+        **options: Unpack[RenderOptions],
+    ) -> Path:
+        """Render looks into one PNG with their names. See `AsyncBake.contact_sheet`."""
+        call = self._bake.contact_sheet(looks, out, view=view, progress=progress, timeout=timeout, **options)
+        return self._thread.run(call)
+
     def images(
         self, looks: Looks, *, view: str | None = None, timeout: float | None = None, **options: Unpack[RenderOptions]
     ) -> list[NDArray[np.uint8]]:
@@ -236,6 +261,44 @@ class Bake:
     def delete(self) -> None:
         """Delete the bake in any state."""
         self._thread.run(self._bake.delete())
+
+
+class Render:
+    """A batch of images."""
+
+    def __init__(self, thread: LoopThread, render: AsyncRender) -> None:
+        self._thread, self._render = thread, render
+
+    @property
+    def id(self) -> str:
+        """Id on the server."""
+        return self._render.id
+
+    @property
+    def info(self) -> RenderBody:
+        """The last known state."""
+        return self._render.info
+
+    def refresh(self) -> RenderBody:
+        """Read the state anew."""
+        return self._thread.run(self._render.refresh())
+
+    def wait(self, *, progress: Progress = False, timeout: float | None = None) -> Self:
+        """Wait until it is ready. See `AsyncRender.wait`."""
+        self._thread.run(self._render.wait(progress=progress, timeout=timeout))
+        return self
+
+    def save(self, target: str | os.PathLike[str]) -> list[Path]:
+        """Download all images. See `AsyncRender.save`."""
+        return self._thread.run(self._render.save(Path(target)))
+
+    def save_named(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Download all images into a folder, with the names of the render."""
+        return self._thread.run(self._render.save_named(folder))
+
+    def delete(self) -> None:
+        """Delete the render and its images."""
+        self._thread.run(self._render.delete())
 
 
 class Session:

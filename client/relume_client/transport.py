@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import os
 import random
+import re
 import tempfile
 import time
 import uuid
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import httpx
 
@@ -111,10 +113,18 @@ class Transport:
         """Download a file into memory."""
         return (await self._call("GET", path)).content
 
-    async def download(self, path: str, target: Path) -> None:
-        """Download a file; an incomplete one never has the name of the target."""
+    async def download(self, path: str, target: Path | None, folder: Path | None = None) -> Path:
+        """Download a file; an incomplete one never has the name of the target.
+
+        Args:
+            path: below the address of the server. target: file to write; None: the server's name in `folder`.
+        Raises:
+            ServerVersionError: the name is missing, or is a path.
+        """
+        response = await self._call("GET", path)
+        target = (folder or Path()) / file_name(response) if target is None else target
         target.parent.mkdir(parents=True, exist_ok=True)
-        content = await self.read(path)
+        content = response.content
         with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as file:
             try:
                 file.write(content)
@@ -123,6 +133,7 @@ class Transport:
             except BaseException:
                 Path(file.name).unlink(missing_ok=True)
                 raise
+        return target
 
     async def _call(self, method: str, path: str, **content: Any) -> httpx.Response:
         headers = {"Idempotency-Key": uuid.uuid4().hex} if method == "POST" else {}
@@ -166,3 +177,15 @@ class Transport:
         return ServerUnavailableError(
             f"the server at {self.url} is not available ({reason}); start it or check the URL"
         )
+
+
+def file_name(response: httpx.Response) -> str:
+    """Name of a download, without folders. Raises ServerVersionError."""
+    disposition = response.headers.get("content-disposition", "")
+    plain, encoded = (
+        re.search(pattern, disposition) for pattern in (r'filename="([^"]+)"', r"filename\*=utf-8''(\S+)")
+    )
+    name = unquote(encoded[1]) if encoded is not None else "" if plain is None else plain[1]
+    if not name.isprintable() or name.startswith(".") or set("/\\:") & set(name) or not name:
+        raise ServerVersionError(f"the server sent a file with the name {name[:80]!r}, which is none for a file here")
+    return name

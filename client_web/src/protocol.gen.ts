@@ -48,6 +48,12 @@ export interface BakeRequest {
   dry_run?: boolean;
 }
 
+/** A view of a bake; `bake` null: that of the request. */
+export interface BakeView {
+  view: string;
+  bake?: string | null;
+}
+
 /** A camera that a user placed, by name. */
 export interface CameraBody {
   to_world: number[];
@@ -127,9 +133,9 @@ export interface EncodingMessage {
   quality?: number;
 }
 
-/** A scene with a look as a file. `look`: a look document, may be partial. `saved_look`: the name of a saved look, instead. `variants`: names of further saved looks, whose materials the file offers as variants. */
+/** A scene with a look as a file. `look`: a look document, may be partial. `saved_look`: the name of a saved look, instead. `variants`: names of further saved looks, whose materials the file offers as variants. `format` "light_mix": JSON with brightness and color of lights by name, itself accepted as a look. */
 export interface ExportRequest {
-  format?: "glb" | "materialx" | "usd";
+  format?: "glb" | "materialx" | "usd" | "light_mix";
   look?: Record<string, unknown>;
   saved_look?: string | null;
   variants?: string[];
@@ -220,18 +226,26 @@ export interface RegionMessage {
   rect: [number, number, number, number] | null;
 }
 
-/** A batch of exact images; looks may be partial. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission, and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
+/** A batch of exact images; looks may be partial, and light mixes. `looks` are documents, `look_names` their names, and `saved_looks` names of saved looks, after them. `view` is the view of `bake`; `views`, instead, are several, also of other bakes: all looks are rendered in each. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. `file_name`: name of each image with fields, such as "{scene}_{view}_{look}.{frame:04}.exr"; fields are `scene`, `bake`, `view`, `look` and `frame`, a number with up to 9 digits. Frames, or looks without `frames` and `path`, are numbered from `start_frame`; of an animation only each `frame_step`-th is rendered, and has its number. `priority`: among renders of the same user, higher ones first. `webhook`: address that gets a signed message when the render has ended, see docs/operations.md. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission, and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second, "contact_sheet" one PNG of all images with their names. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
 export interface RenderRequest {
   bake: string;
-  looks: Record<string, unknown>[];
+  looks?: Record<string, unknown>[];
   frames?: number | null;
   durations?: number[] | null;
   interpolation?: "parameters" | "map" | "map_low";
   path?: Turntable | CameraPath | null;
-  view: string;
-  format: "exr" | "png" | "webp" | "mp4";
+  look_names?: string[];
+  saved_looks?: string[];
+  view?: string | null;
+  views?: BakeView[];
+  format: "exr" | "png" | "webp" | "mp4" | "contact_sheet";
   size?: [number, number] | null;
   name?: string | null;
+  file_name?: string | null;
+  start_frame?: number;
+  frame_step?: number;
+  priority?: number;
+  webhook?: string | null;
   layers?: boolean | "light_groups";
   aovs?: boolean;
   precision?: "half" | "float";
@@ -878,15 +892,18 @@ export interface RecurrenceBody {
   c: number[];
 }
 
-/** A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one. `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without login. `created`, `started` and `ended` are times; null: not yet. */
+/** A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one. `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without login. `view`: null if there are several `views`. `warnings`: a sentence for each part of a light mix that a scene does not have. `created`, `started` and `ended` are times; null: not yet. */
 export interface RenderBody {
   id: string;
   name: string | null;
   user: string;
   bake: string;
-  view: string;
-  format: "exr" | "png" | "webp" | "mp4";
+  view: string | null;
+  views: BakeView[];
+  format: "exr" | "png" | "webp" | "mp4" | "contact_sheet";
   size: [number, number] | null;
+  priority: number;
+  warnings: string[];
   state: "queued" | "running" | "ready" | "failed" | "canceled";
   created: string;
   started: string | null;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from relume.core.import_warnings import quote
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial, MaterialExporter
 from relume.look import Look, default_look, validate
+from relume.look.light_mix import expand_light_mix
 from relume.look.model import LightLook, RectangleLook
 from relume.scene.model import Scene
 
@@ -24,7 +25,7 @@ class ExportDocument:
     Attributes:
         scene: geometry, cameras and names. look: lights and environment of the file.
         materials: as the look shows them, in the scene's order. variants: materials of further looks by their names.
-        images: images of all materials.
+        images: images of all materials. warnings: sentences about light mixes among the looks.
     """
 
     scene: Scene
@@ -32,6 +33,7 @@ class ExportDocument:
     materials: list[ExportMaterial]
     variants: dict[str, list[ExportMaterial]]
     images: ExportImages
+    warnings: tuple[str, ...] = ()
 
     def all_materials(self) -> list[ExportMaterial]:
         """Every material once: those of the look, then those of variants that differ from them."""
@@ -60,11 +62,14 @@ class ExportDocument:
                 yield name, light
 
 
-def prepare_export(scene: Scene, look: Look, variants: Mapping[str, Look] | None = None) -> ExportDocument:
+def prepare_export(
+    scene: Scene, look: Look, variants: Mapping[str, Look] | None = None, *, has_materials: bool = True
+) -> ExportDocument:
     """Convert a scene's materials, without writing anything.
 
     Args:
         scene: the scene. look: a complete look of it. variants: further complete looks of it by name.
+        has_materials: the file has materials; otherwise none are converted.
     Raises:
         ParameterError: there are too many variants. NotFoundError, SceneError: an image of a look is unavailable.
     """
@@ -72,9 +77,18 @@ def prepare_export(scene: Scene, look: Look, variants: Mapping[str, Look] | None
     if len(variants) > MAX_VARIANTS:
         raise ParameterError("variants", len(variants), f"at most {MAX_VARIANTS} looks")
     images = ExportImages()
+    if not has_materials:
+        return ExportDocument(scene, look, [], {name: [] for name in variants}, images)
     exporter = MaterialExporter(scene, images)
     by_variant = {name: exporter.materials(each) for name, each in variants.items()}
     return ExportDocument(scene, look, exporter.materials(look), by_variant, images)
+
+
+def light_mix_warnings(scene: Scene, documents: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return sentences about what a scene does not have of light mixes among look documents."""
+    default = default_look(scene.materials, scene.lights)
+    texts = [text for document in documents for text in expand_light_mix(document, default)[1]]
+    return tuple(dict.fromkeys(texts))
 
 
 def look_of_scene(scene: Scene, document: Mapping[str, Any], label: str) -> Look:

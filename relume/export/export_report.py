@@ -63,7 +63,7 @@ class ExportReport:
 
 
 def make_report(export: ExportDocument, omitted: tuple[str, ...]) -> ExportReport:
-    """Return the report of an export. omitted: sentences about the file, from its writer."""
+    """Return the report of an export. omitted: sentences about the file."""
     own = [_report(material, None) for material in export.materials]
     differing = [
         _report(material, name)
@@ -71,15 +71,15 @@ def make_report(export: ExportDocument, omitted: tuple[str, ...]) -> ExportRepor
         for material, original in zip(materials, export.materials, strict=True)
         if material is not original
     ]
-    return ExportReport((*own, *differing), omitted + _omitted_from_all(export))
+    return ExportReport((*own, *differing), omitted)
 
 
 def _report(material: ExportMaterial, look: str | None) -> MaterialReport:
     return MaterialReport(material.name, look, material.is_exact, round(material.error, 4), material.omitted)
 
 
-def _omitted_from_all(export: ExportDocument) -> tuple[str, ...]:
-    """Sentences about a look that no file has."""
+def omitted_from_scene_files(export: ExportDocument) -> tuple[str, ...]:
+    """Sentences about a look that no file with materials has."""
     display, transport = export.look.display, export.look.transport
     sentences = {
         "Area lights become visible emissive rectangles.": any(

@@ -20,6 +20,7 @@ from relume.core.validation import (
 )
 from relume.image_io.ocio.view import MAX_NAME
 from relume.look.glass import complete_glass, default_glass
+from relume.look.light_mix import expand_light_mix
 from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
 from relume.look.model import BackgroundKind, BasisFunctions, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
@@ -69,12 +70,13 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
 def complete(partial: Mapping[str, Any], default: Mapping[str, Any]) -> dict[str, Any]:
     """Complete a partial look: fields that `partial` omits are taken from `default`.
 
-    A material's list of terms is replaced as a whole. Missing fields of a term get its model's defaults.
+    A material's list of terms is replaced as a whole. Missing fields of a term get its model's defaults. `partial` may
+    be a light mix (`relume.look.light_mix`).
 
     Raises:
         ParameterError: with the JSON pointer of the first invalid value, and the allowed values.
     """
-    return complete_changes(partial, default, default)
+    return complete_changes(expand_light_mix(partial, default)[0], default, default)
 
 
 def validate(document: Mapping[str, Any], default: Mapping[str, Any]) -> Look:

@@ -30,7 +30,8 @@ from relume_server.io.import_request import remove_strays
 from relume_server.io.streamed_responses import StreamedResponses
 from relume_server.jobs.btf_jobs import BtfJobs
 from relume_server.jobs.comparison_jobs import ComparisonJobs
-from relume_server.jobs.render_jobs import RenderJobs
+from relume_server.jobs.render_jobs import RenderJob, RenderJobs, ended_message
+from relume_server.jobs.webhooks import Webhooks
 from relume_server.lifecycle.drain import DrainState
 from relume_server.persistence.comment_store import CommentStore
 from relume_server.persistence.idempotency import IdempotencyStore
@@ -67,7 +68,7 @@ class Services:
         pictures: renders thumbnails, and merges identical concurrent requests.
         responses: large responses.
         readiness: whether the server can serve.
-        import_queue: runs imports, and stores their results.
+        import_queue: runs imports, and stores their results. webhooks: messages about jobs that have ended.
     """
 
     settings: Settings
@@ -91,6 +92,7 @@ class Services:
     live: SessionServices
     readiness: RecentCheck
     import_queue: ImportQueue
+    webhooks: Webhooks
 
 
 NUM_PICTURES = 2
@@ -156,7 +158,9 @@ async def open_services(
         cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes)
         _watch_memory(metrics, library, transfers)
         _watch_jobs(metrics, settings, service, drain)
-        kinds = _open_kinds(settings, service, executor, access)
+        webhooks = Webhooks(settings.webhook_hosts, settings.webhook_secret.get_secret_value())
+        at_end(webhooks.close)
+        kinds = _open_kinds(settings, service, executor, access, webhooks)
         at_end(kinds.comparisons.close)
         at_end(service.jobs.close)
         await asyncio.to_thread(service.start)
@@ -197,6 +201,7 @@ async def open_services(
             live=_live(settings, metrics, traces, library, threads, service, access, drain, rooms, room_lease),
             readiness=RecentCheck(partial(_check_ready, service, access)),
             import_queue=ImportQueue(settings, service.ledger, access.quotas, importers),
+            webhooks=webhooks,
         )
 
 
@@ -208,7 +213,9 @@ class _Kinds(NamedTuple):
     btfs: BtfJobs
 
 
-def _open_kinds(settings: Settings, service: BakeService, executor: StepExecutor, access: AuthServices) -> _Kinds:
+def _open_kinds(
+    settings: Settings, service: BakeService, executor: StepExecutor, access: AuthServices, webhooks: Webhooks
+) -> _Kinds:
     """Add the server's kinds of jobs to the service that runs the bakes."""
     jobs = service.jobs
     jobs.use_steps(executor.run, executor.num_slots, lambda error: make_problem(error).detail)
@@ -217,6 +224,10 @@ def _open_kinds(settings: Settings, service: BakeService, executor: StepExecutor
     def scene_name(bake: str) -> str:
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
+    def notify(job: RenderJob) -> None:
+        if job.request.webhook is not None:
+            webhooks.send(job.request.webhook, ended_message(job))
+
     def on_btf_ready(work: str, material: str, num_bytes: int) -> None:
         access.quotas.convert(("btf-job", work), ("btf", material), num_bytes)
 
@@ -224,7 +235,7 @@ def _open_kinds(settings: Settings, service: BakeService, executor: StepExecutor
         access.quotas.set_bytes("btf-job", work, 0)
 
     return _Kinds(
-        RenderJobs(jobs, settings.data, scene_name, partial(access.quotas.set_bytes, "render")),
+        RenderJobs(jobs, settings.data, scene_name, partial(access.quotas.set_bytes, "render"), notify),
         ComparisonJobs(jobs, settings.data, partial(access.quotas.set_bytes, "comparison")),
         BtfJobs(jobs, settings.data, on_btf_ready, on_btf_failed),
     )

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from platformdirs import user_data_dir
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from relume_worker.idle_timer import DEFAULT_IDLE_S
 
 GIB = 1024**3
+MIN_SECRET = 16
 RoleName = Literal["view", "edit", "admin"]
 
 
@@ -43,17 +44,19 @@ def _editor_folder() -> Path:
 _HOST_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9_]([A-Za-z0-9_.-]{0,251}[A-Za-z0-9_])?")
 
 
-def _check_proxy(text: str) -> str:
+def _check_host_or_network(text: str) -> str:
     try:
         ip_network(text, strict=False)
     except ValueError:
         if _HOST_NAME.fullmatch(text) is None:
-            allowed = "an address such as 10.0.0.5, a network such as 10.0.0.0/8, or a host name such as proxy"
+            allowed = (
+                "an address such as 10.0.0.5, a network such as 10.0.0.0/8, or a host name such as proxy.example.org"
+            )
             raise ValueError(allowed) from None
     return text
 
 
-ProxyAddress = Annotated[str, AfterValidator(_check_proxy)]
+HostOrNetwork = Annotated[str, AfterValidator(_check_host_or_network)]
 """An IP address, a network such as 10.0.0.0/8, or a host name."""
 
 
@@ -142,7 +145,7 @@ class Settings(BaseSettings):
     https_only: bool = Field(
         default=False, description="whether clients use HTTPS only: Secure cookies, Strict-Transport-Security"
     )
-    trusted_proxies: list[ProxyAddress] = Field(
+    trusted_proxies: list[HostOrNetwork] = Field(
         default=[], description="addresses, networks or names of proxies trusted for X-Forwarded-…, as JSON list"
     )
     user_header: str = Field(default="", description="header with the user's name from these proxies; empty: none")
@@ -169,11 +172,28 @@ class Settings(BaseSettings):
     )
     drain_seconds: float = Field(default=10.0, ge=0, description="time for sessions to move after SIGTERM")
     stop_seconds: float = Field(default=30.0, gt=0, description="time for everything else to stop afterwards")
+    webhook_hosts: list[HostOrNetwork] = Field(
+        default=[],
+        description="hosts that may get a message when a render ends, and networks such as 10.1.0.0/16 for addresses "
+        "that are not public, as JSON list; empty: no webhooks",
+    )
+    webhook_secret: SecretStr = Field(
+        default=SecretStr(""),
+        validate_default=True,
+        description=f"key of the signatures of these messages, at least {MIN_SECRET} characters",
+    )
     allowed_origins: list[str] = Field(default=[], description="allowed origins besides the server's own, as JSON list")
     allowed_hosts: list[str] = Field(
         default=["localhost", "127.0.0.1", "::1"],
         description='host names of the server, as JSON list; ["*"] for any',
     )
+
+    @field_validator("webhook_secret")
+    @classmethod
+    def _check_webhook_secret(cls, secret: SecretStr, info: ValidationInfo) -> SecretStr:
+        if info.data.get("webhook_hosts") and len(secret.get_secret_value()) < MIN_SECRET:
+            raise ValueError(f"at least {MIN_SECRET} characters, because RELUME_WEBHOOK_HOSTS is set")
+        return secret
 
     @property
     def max_queued_per_client(self) -> int:

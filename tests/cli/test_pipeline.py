@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenImageIO
 import pytest
 from btf_zips import zipped
 from PIL import Image
@@ -292,7 +293,7 @@ def test_dry_run_of_a_render_validates_and_writes_nothing(run: Any, tmp_path: Pa
     ("words", "said"),
     [
         (["--look", "Blue", "--look", "Red night", "--output", "x.png"], "{look}"),
-        (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "two would become Blue.png"),
+        (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "images 0 and 1 would both be 'Blue.png'"),
         (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "look with --turntable"),
         (["--look", "Green", "--output", "x.png"], "folder or saved look; choose from 'Blue', 'Red night'"),
         (["--look", "/no/look.json", "--output", "x.png"], "--look is '/no/look.json'; give a file that exists"),
@@ -306,8 +307,24 @@ def test_dry_run_of_a_render_validates_and_writes_nothing(run: Any, tmp_path: Pa
         (["--between", "map", "--output", "x.png"], "--between is 'map'; give it with --frames N"),
         (["--rotate", "object", "--output", "x.png"], "--rotate is 'object'; give it with --turntable N"),
         (["--fps", "10", "--output", "x.png"], "--fps is 10; give it with --turntable N"),
-        (["--turntable", "2", "--output", "x.png"], "a folder for the numbered frames, or a name ending in .mp4"),
-        (["--turntable", "2", "--output", "x.mov"], "a folder for the numbered frames, or a name ending in .mp4"),
+        (
+            ["--turntable", "2", "--output", "x.png"],
+            "a folder for the numbered frames, a name with {frame:04}, or a name ending in .mp4",
+        ),
+        (
+            ["--turntable", "2", "--output", "x.mov"],
+            "a folder for the numbered frames, a name with {frame:04}, or a name ending in .mp4",
+        ),
+        (["--output", "x.{frame:04}.mp4", "--frames", "9"], "without {frame}"),
+        (["--output", "{user}.png"], "--output is '{user}'; give the fields {scene}, {bake}, {view}, {look}, {frame}"),
+        (["--step", "2", "--output", "x.png"], "--step is 2; give it with --turntable N"),
+        (["--view", "front", "--view", "front", "--output", "x.png"], "images 0 and 1 would both be 'x.png'"),
+        (["--output", "x.exr", "--contact-sheet", "s.png"], "PNG or WebP files for --contact-sheet"),
+        (
+            ["--output", "x.png", "--contact-sheet", "s.jpg"],
+            "--contact-sheet is 's.jpg'; give a file name ending in .png",
+        ),
+        (["--output", "x.png", "--contact-sheet", "x.png"], "another name than those of the images"),
         (["--float", "--output", "x.png"], "--output is 'x.png'; give a file name that ends in .exr"),
     ],
 )
@@ -320,6 +337,57 @@ def test_invalid_render_prints_one_sentence(
     assert said in error
     assert len(error.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_names_have_all_fields_and_a_contact_sheet_all_images(run: Any, tmp_path: Path) -> None:
+    words = ["--look", "Blue", "--look", "Red night", "--start", "1001", "--contact-sheet", str(tmp_path / "s.png")]
+    output = str(tmp_path / "{scene}_{view}_{look}.{frame:05}.png")
+    code, text, _ = run("render", "quad one", *words, "--output", output)
+    names = ["Quad-one_Front_Blue.01001.png", "Quad-one_Front_Red-night.01002.png"]
+    assert (code, text.split()) == (0, [str(tmp_path / name) for name in names])
+    sheet = np.asarray(Image.open(tmp_path / "s.png"))
+    assert sheet.shape == (24 + 24 + 2 * 12, 2 * 32 + 3 * 12, 3)
+    for x, name in ((12, names[0]), (56, names[1])):
+        np.testing.assert_array_equal(sheet[12:36, x : x + 32], np.asarray(Image.open(tmp_path / name)))
+
+
+def test_several_views_are_rendered_in_one_call(run: Any, tmp_path: Path) -> None:
+    to_world = [1, 0, 0, 0.6, 0, 1, 0, 0, 0, 0, 1, 1.5, 0, 0, 0, 1]
+    (tmp_path / "side.json").write_text(json.dumps({"name": "Side", "to_world": to_world, "yfov": 45.0}))
+    bake = run("bake", "quad one", "--view", "front", "--camera", str(tmp_path / "side.json"), *TINY)[1].strip()
+    views = ["--view", "side", "--view", "front"]
+    code, text, said = run("render", bake, *views, "--look", "Blue", "--output", str(tmp_path / "{view}.png"))
+    assert (code, text.split()) == (0, [str(tmp_path / "Side.png"), str(tmp_path / "Front.png")]), said
+    for view in ("Side", "Front"):
+        run("render", bake, "--view", view, "--look", "Blue", "--output", str(tmp_path / "one.png"))
+        assert (tmp_path / "one.png").read_bytes() == (tmp_path / f"{view}.png").read_bytes()
+    assert (tmp_path / "Side.png").read_bytes() != (tmp_path / "Front.png").read_bytes()
+
+
+def test_frames_of_a_template_may_be_exr_and_skip_steps(run: Any, tmp_path: Path) -> None:
+    words = ["--turntable", "4", "--rotate", "environment", "--step", "2", "--start", "7"]
+    output = str(tmp_path / "{view}.{frame:03}.exr")
+    code, text, said = run("render", "quad one", *words, "--output", output)
+    assert (code, text) == (0, f"{tmp_path / 'Front.007.exr'}\n"), said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["Front.007.exr", "Front.009.exr"]
+    spec = OpenImageIO.ImageBuf(str(tmp_path / "Front.009.exr")).spec()
+    assert json.loads(spec.get_string_attribute("relume:look"))["environment"]["rotation"] == -180
+    assert run("render", "quad one", *words, "--output", output)[0] == 1
+    assert run("render", "quad one", *words, "--output", output, "--resume")[0] == 0
+
+
+def test_a_light_mix_is_exported_and_rendered(run: Any, tmp_path: Path) -> None:
+    (tmp_path / "dim.json").write_text('{"environment": {"intensity": 0.25}}')
+    mix = tmp_path / "mix.json"
+    assert run("export", "quad one", str(mix), "--look", str(tmp_path / "dim.json"))[0] == 0
+    document = json.loads(mix.read_text())
+    assert (document["environment"]["intensity"], document["lights"]) == (0.25, {})
+    mix.write_text(json.dumps({**document, "lights": {"Key": {"intensity": 2}}}))
+    words = ["--look", str(tmp_path / "dim.json"), "--look", str(mix), "--output", str(tmp_path / "{look}.png")]
+    code, _, said = run("render", "quad one", *words)
+    assert code == 0
+    assert said.count("warning: The light mix has values for lights that the scene does not have: 'Key'.") == 1
+    assert (tmp_path / "mix.png").read_bytes() == (tmp_path / "dim.png").read_bytes()
 
 
 def test_turntable_video_is_written_and_its_path_printed(run: Any, tmp_path: Path) -> None:

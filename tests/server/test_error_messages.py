@@ -26,8 +26,8 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("url", "body", "said"),
     [
-        (RENDERS, {"format": "tiff"}, "/format is 'tiff'; give 'exr', 'png', 'webp' or 'mp4'"),
-        (RENDERS, {"looks": []}, "/looks is a list of 0 entries; give at least 1 entry"),
+        (RENDERS, {"format": "tiff"}, "/format is 'tiff'; give 'exr', 'png', 'webp', 'mp4' or 'contact_sheet'"),
+        (RENDERS, {"looks": []}, "/looks is a list of 0 looks, with saved_looks; give 1 to 1,000 looks"),
         (RENDERS, {"looks": [1]}, "/looks/0 is 1; give an object"),
         (RENDERS, {"fps": 0}, "/fps is 0; give at least 1"),
         (RENDERS, {"fps": "x"}, "/fps is 'x'; give a whole number"),

@@ -54,6 +54,22 @@ def test_the_report_precedes_the_file(client: TestClient, url: str) -> None:
     assert client.post(f"{url}/report", json={"look": RED}).json()["materials"][0]["exact"]
 
 
+def test_a_light_mix_is_exported_and_one_given_as_look_says_what_is_missing(client: TestClient, url: str) -> None:
+    mix = client.post(url, json={"format": "light_mix", "look": {"environment": {"intensity": 0.25}}})
+    assert mix.headers["content-type"] == "application/json"
+    assert mix.headers["content-disposition"] == 'attachment; filename="triangle.json"'
+    assert (mix.json()["format"], mix.json()["environment"]["intensity"]) == ("relume light mix", 0.25)
+    look = {**mix.json(), "lights": {"Key": {"intensity": 2.0}}}
+    report = client.post(f"{url}/report", json={"format": "light_mix", "look": look}).json()
+    assert report == {
+        "materials": [],
+        "omitted": ["The light mix has values for lights that the scene does not have: 'Key'."],
+    }
+    again = client.post(url, json={"format": "light_mix", "look": look}).json()
+    assert again == mix.json()
+    assert leftovers(client) == []
+
+
 @pytest.mark.parametrize(
     ("request_body", "text"),
     [

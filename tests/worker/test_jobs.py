@@ -56,6 +56,17 @@ def test_clients_take_turns_and_small_jobs_go_first() -> None:
     assert [next_client(turns, waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
 
 
+def test_priorities_order_the_jobs_of_one_client_only() -> None:
+    turns = FairShare({})
+    waiting = [
+        Waiting("a1", "ann", False, 1.0),
+        Waiting("a2", "ann", False, 2.0, priority=5),
+        Waiting("a3", "ann", False, 3.0, priority=-5),
+        Waiting("b1", "bob", False, 4.0, priority=-10),
+    ]
+    assert [work.id for work in turns.sort(waiting)] == ["a2", "b1", "a1", "a3"]
+
+
 def test_client_who_returns_between_turns_keeps_its_share() -> None:
     turns = FairShare({})
     many, one = [Waiting(f"a{k}", "ann", False, k) for k in range(4)], Waiting("b", "bob", False, 9.0)
@@ -120,6 +131,7 @@ class Frames(BaseModel):
 
     name: str
     num: int
+    priority: int = 0
 
 
 class FrameJobs(JobKind[Frames]):
@@ -132,6 +144,9 @@ class FrameJobs(JobKind[Frames]):
 
     def is_first(self, request: Frames) -> bool:
         return False
+
+    def priority(self, request: Frames) -> int:
+        return request.priority
 
     def run(self, run: JobRun[Frames]) -> None:
         missing = [k for k in range(run.job.total) if not (run.folder / str(k)).exists()]
@@ -208,6 +223,24 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path, 
     jobs.service.close()
     assert sorted(machine.done) == sorted("aAb" * 4)
     assert machine.done[:7].count("b") >= 3, "bob has half of the turns while he waits"
+
+
+def test_steps_of_a_higher_priority_run_first_and_the_row_has_it(tmp_path: Path, ledger: Ledger) -> None:
+    machine = Machine()
+    jobs = Jobs(ledger, tmp_path, machine)
+    jobs.submit("a", num=3)
+    urgent = jobs.frames.submit(Frames(name="b", num=3, priority=5))
+    last = jobs.frames.submit(Frames(name="c", num=3, priority=-5))
+    with ledger.sessions() as session:
+        assert session.scalar(select(JobRow.priority).where(JobRow.id == urgent)) == 5
+    may_begin = threading.Event()
+    machine.before = lambda path, is_needed: wait_for(may_begin.is_set)
+    jobs.service.start()
+    wait_for(lambda: len(machine.slots._waiting) == 2)  # the first step has the slot
+    may_begin.set()
+    jobs.wait(last)
+    jobs.service.close()
+    assert machine.done == [*"bbb", *"aaa", *"ccc"]
 
 
 def test_job_is_deleted_if_the_ledger_has_no_disk_space(

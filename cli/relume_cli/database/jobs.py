@@ -40,8 +40,8 @@ def job_tables() -> Mapping[str, JobTable]:
     return {
         "render": JobTable(
             "render", "renders", "render", RENDER_PLACEHOLDER, ("bake", "view", "format", "size"),
-            lambda request: int(request.num_frames), "frames",
-            lambda request: f"{request.name or request.view}, {request.format}",
+            lambda request: int(request.num_images), "frames",
+            lambda request: f"{request.name or request.view or 'render'}, {request.format}",
         ),
         "comparison": JobTable(
             "comparison", "comparisons", "comparison", ComparisonJobs.placeholder, ("bake", "view", "paths"),

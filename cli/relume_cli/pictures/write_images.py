@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from relume_cli.pictures.files import save
-from relume_cli.pictures.plans import VIDEO, frames_folder
+from relume_cli.pictures.plans import VIDEO
 from relume_cli.terminal.progress import ReportProgress, report_part
 
 if TYPE_CHECKING:
@@ -47,52 +47,69 @@ class RenderSource(NamedTuple):
 
 
 def write_picture(
-    source: RenderSource, look: Look, path: Path, exr: ExrOptions, report: Callable[[float], None]
+    source: RenderSource,
+    look: Look,
+    path: Path,
+    exr: ExrOptions,
+    report: Callable[[float], None],
+    camera: Camera | None = None,
 ) -> None:
     """Render the exact image of a look, and write it.
 
     Args:
         source: a bake. look: complete. path: path of the file. exr: options for EXR files.
-        report: called with the fraction done.
+        report: called with the fraction done. camera: of a free camera; None: that of the view.
     """
-    from relume.output.render_image import render_image
+
+    def render(shown_look: Look, progress: Callable[[float], None], *, for_display: bool = False) -> NDArray[Any]:
+        from relume.output.render_image import render_image
+
+        view = source.transfer.views[source.view]
+        return render_image(
+            source.transfer,
+            source.view,
+            shown_look,
+            progress=progress,
+            for_display=for_display,
+            camera_and_size=None if camera is None else (camera, (view.width, view.height)),
+            static_views=source.static_views(shown_look),
+        )
 
     if path.suffix.lower() == ".exr":
-        _write_exr(source, look, path, exr, report)
-        return
-    image = render_image(
-        source.transfer, source.view, look, progress=report, for_display=True, static_views=source.static_views(look)
-    )
-    save(path, image, look)
+        _write_exr(source, look, path, exr, report, camera, render)
+    else:
+        save(path, render(look, report, for_display=True), look)
 
 
-def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, report: Callable[[float], None]) -> None:
+def _write_exr(
+    source: RenderSource,
+    look: Look,
+    path: Path,
+    exr: ExrOptions,
+    report: Callable[[float], None],
+    camera: Camera | None,
+    render: Callable[[Look, Callable[[float], None]], NDArray[Any]],
+) -> None:
     from relume.live.fixed_camera.protocols import EditAxis
     from relume.output.exr.aovs import AovTracer
     from relume.output.exr.color_space import find_space
     from relume.output.exr.export import AovPass, export_exr
     from relume.output.exr.layers import make_layers
     from relume.output.exr.metadata import Provenance, build_attributes
-    from relume.output.render_image import render_image
 
     view = source.transfer.views[source.view]
     layers = make_layers(exr.layering, look, has_indirect=EditAxis.BOUNCES in source.transfer.axes)
     space = find_space(exr.color_space)
     size = view.width, view.height
-    aovs = AovPass(AovTracer.from_look(source.load_scene(), look), view.camera, size) if exr.aovs else None
+    camera = camera or view.camera
+    aovs = AovPass(AovTracer.from_look(source.load_scene(), look), camera, size) if exr.aovs else None
     origin = Provenance(source.scene.id, source.scene.name, source.bake.id)
     export_exr(
         path,
-        lambda layer_look, layer_progress: render_image(
-            source.transfer,
-            source.view,
-            layer_look,
-            progress=layer_progress,
-            static_views=source.static_views(layer_look),
-        ),
+        render,
         look,
         layers,
-        build_attributes(origin, view.camera, size, look, layers, space),
+        build_attributes(origin, camera, size, look, layers, space),
         exr.precision,
         report,
         space,
@@ -101,42 +118,30 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
 
 
 def write_animation(
-    source: RenderSource, planned_file: PlannedFile, animation_plan: AnimationPlan, report: ReportProgress
+    source: RenderSource,
+    planned_file: PlannedFile,
+    animation_plan: AnimationPlan,
+    exr: ExrOptions,
+    report: ReportProgress,
 ) -> None:
-    """Write the missing frames 0000.png, 0001.png, … into a folder, or a video of them.
+    """Write the missing frames of an animation, or a video of them.
 
     Args:
         source: an opened bake; a free-camera one if the camera or the object rotates. planned_file: a look and its
-            path, or keyframes. animation_plan: frames and subject.
+            path, or keyframes. animation_plan: frames and subject. exr: options for EXR files.
         report: called with the fraction done, within frames as well.
     """
-    from relume.output.render_image import render_image
     from relume_server.batch.frame_sequence import look_at_frame
     from relume_server.io.video import write_video
 
     animation, cameras = check_animation_plan(source, planned_file, animation_plan)
-    folder, view = frames_folder(planned_file.path), source.transfer.views[source.view]
+    folder, num_frames = planned_file.frames[0].parent, len(planned_file.frames)
     folder.mkdir(exist_ok=True)
-
-    def frame(camera: Camera | None, frame_look: Look, report_frame: Callable[[float], None]) -> NDArray[Any]:
-        camera_and_size = None if camera is None else (camera, (view.width, view.height))
-        return render_image(
-            source.transfer,
-            source.view,
-            frame_look,
-            progress=report_frame,
-            for_display=True,
-            camera_and_size=camera_and_size,
-            static_views=source.static_views(frame_look),
-        )
-
-    for index, camera in enumerate(cameras):
-        file, frame_look = folder / f"{index:04d}.png", look_at_frame(animation, source.view, source.transfer, index)
+    for number, (index, file) in enumerate(zip(animation_plan.frame_indices, planned_file.frames, strict=True)):
         if not file.exists():
-            report_frame = report_part(
-                report, index, animation_plan.frames, f"frame {index + 1} of {animation_plan.frames}"
-            )
-            save(file, frame(camera, frame_look, report_frame), frame_look)
+            report_frame = report_part(report, number, num_frames, f"frame {number + 1} of {num_frames}")
+            look = look_at_frame(animation, source.view, source.transfer, index)
+            write_picture(source, look, file, exr, report_frame, cameras[index])
     if planned_file.path.suffix.lower() == VIDEO:
         report(1.0, "encoding the video")
         write_video(folder, animation_plan.fps, planned_file.path, lambda: False)

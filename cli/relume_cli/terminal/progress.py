@@ -22,13 +22,18 @@ class ReportProgress(Protocol):
     def __call__(self, share: float, detail: str = "") -> None: ...
 
 
-def report_part(report: ReportProgress, index: int, total: int, detail: str) -> Callable[[float], None]:
+def report_part(report: ReportProgress, index: int, total: int, detail: str) -> ReportProgress:
     """Return a callback that reports one part of a larger work.
 
     Args:
-        report: report of the whole work. index, total: index and total of the part. detail: text for the part.
+        report: report of the whole work. index, total: index and total of the part.
+        detail: text for the part, unless it has a more precise one.
     """
-    return lambda share: report((index + share) / total, detail)
+
+    def report_share(share: float, own_detail: str = "") -> None:
+        report((index + share) / total, own_detail or detail)
+
+    return report_share
 
 
 class ProgressLines:

@@ -1,6 +1,7 @@
 /** Export: PNG and EXR with one click each; more EXR variants, turntables of free-camera views, and the scene. */
 import { useState } from "preact/hooks";
 import {
+  exportContactSheet,
   exportExr,
   exportPng,
   exportTurntable,
@@ -45,6 +46,7 @@ const IMAGE_EXPORTS: ExportOption[] = [
     run: () => exportExr({ aovs: true }),
   },
   { label: "EXR, beauty only", help: "Faster, smaller", run: () => exportExr({}) },
+  { label: "Contact sheet", help: "All saved looks in one PNG, with their names", run: exportContactSheet },
 ];
 
 const TURNTABLE_EXPORTS: ExportOption[] = [
@@ -175,7 +177,7 @@ export function ExportMenu() {
             >
               Scene…
             </button>
-            <span>GLB, USD or MaterialX with this look</span>
+            <span>GLB, USD or MaterialX with this look; its light mix</span>
           </li>
           {hasFreeCamera.value && <TurntableSelect />}
           {exrSpaces.value.length > 0 && <ColorSpaceSelect />}

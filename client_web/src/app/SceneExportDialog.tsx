@@ -29,11 +29,14 @@ function useReport(id: string, request: ExportRequest): ExportReportBody | Error
   return report;
 }
 
-function ReportList({ report }: { report: ExportReportBody | Error | null }) {
-  if (report === null) return <p role="status">Fitting materials…</p>;
+function ReportList({ report, isMix }: { report: ExportReportBody | Error | null; isMix: boolean }) {
+  if (report === null) return <p role="status">{isMix ? "Reading lights…" : "Fitting materials…"}</p>;
   if (report instanceof Error) return <p role="alert">{report.message}</p>;
   const lines = reportLines(report);
-  if (lines.length === 0) return <p role="status">The file has everything that the look shows.</p>;
+  const complete = isMix
+    ? "The file has all lights, without materials."
+    : "The file has everything that the look shows.";
+  if (lines.length === 0) return <p role="status">{complete}</p>;
   return (
     <ul role="status" aria-label="Differences">
       {lines.map((line) => (
@@ -52,7 +55,8 @@ export function SceneExportDialog({ onClose }: { onClose: () => void }) {
   const [exportedLook] = useState(() => look.peek());
   useEffect(() => dialog.current?.showModal(), []);
   const id = scene.value?.id ?? "";
-  const variants = hasVariants ? savedLooks.value.map(({ name }) => name) : [];
+  const isMix = format === "light_mix";
+  const variants = hasVariants && !isMix ? savedLooks.value.map(({ name }) => name) : [];
   const request = { format, look: exportedLook ?? {}, variants } as ExportRequest;
   const report = useReport(id, request);
   const save = async () => {
@@ -86,12 +90,12 @@ export function SceneExportDialog({ onClose }: { onClose: () => void }) {
         <input
           type="checkbox"
           checked={hasVariants}
-          disabled={savedLooks.value.length === 0}
+          disabled={isMix || savedLooks.value.length === 0}
           onChange={(event) => setHasVariants(event.currentTarget.checked)}
         />
         Saved looks as variants
       </label>
-      <ReportList report={report} />
+      <ReportList report={report} isMix={isMix} />
       {problem !== "" && <p role="alert">{problem}</p>}
       <button disabled={busy || report === null || report instanceof Error} onClick={() => void save()}>
         {busy ? "Exporting…" : "Download"}

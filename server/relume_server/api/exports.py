@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ from starlette.background import BackgroundTask
 
 from relume.core.errors import ParameterError
 from relume.core.folder_size import folder_bytes
-from relume.export.export_document import ExportDocument, look_of_scene, prepare_export
+from relume.export.export_document import ExportDocument, light_mix_warnings, look_of_scene, prepare_export
 from relume.export.export_scene import FORMATS, export_report
+from relume.output.file_names import safe_stem
 from relume.scene.scene_folder import load_scene
 from relume_server.auth.roles import CallerDep
-from relume_server.io.downloads import Download, safe_stem
+from relume_server.io.downloads import Download
 from relume_server.io.import_request import UPLOAD_PREFIX
 from relume_server.openapi import files
 from relume_server.persistence.look_store import check_name
@@ -81,5 +83,9 @@ def _prepare(scene: str, request: ExportRequest, services: Services) -> ExportDo
         return document
 
     document = request.look if request.saved_look is None else saved(request.saved_look)
-    variants = {name: look_of_scene(loaded, saved(name), f"look {name!r}") for name in request.variants}
-    return prepare_export(loaded, look_of_scene(loaded, document, "look"), variants)
+    variants = {name: saved(name) for name in request.variants}
+    looks = {name: look_of_scene(loaded, each, f"look {name!r}") for name, each in variants.items()}
+    prepared = prepare_export(
+        loaded, look_of_scene(loaded, document, "look"), looks, has_materials=FORMATS[request.format].has_materials
+    )
+    return replace(prepared, warnings=light_mix_warnings(loaded, [document, *variants.values()]))

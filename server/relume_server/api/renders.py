@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
@@ -13,12 +14,14 @@ from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.image_io.ocio.active_config import get_config
 from relume.image_io.ocio.view import OcioView
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, OpenBake
+from relume.look.light_mix import expand_light_mix
 from relume.output.exr.color_space import find_space
 from relume.output.exr.layers import make_layers
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import PageDep
 from relume_server.auth.roles import Caller, CallerDep
+from relume_server.batch.batch_request import check_views, look_pointers, resolve_looks
 from relume_server.batch.frame_sequence import (
     check_animation,
     crossed_material,
@@ -26,6 +29,7 @@ from relume_server.batch.frame_sequence import (
     look_document_at_frame,
     with_pivot,
 )
+from relume_server.batch.image_names import label_images, name_images
 from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
@@ -40,6 +44,7 @@ from relume_server.schemas.renders import (
     Keyframes,
     LooksBody,
     LooksRequest,
+    QueuedRender,
     RenderBody,
     RenderRequest,
 )
@@ -50,6 +55,7 @@ from relume_worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])
 FrameIndex = Annotated[int, Path(ge=0, lt=MAX_FRAMES)]
+MAX_WARNINGS = 20
 MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
 
 
@@ -58,18 +64,34 @@ async def submit_render(
     request: RenderRequest, services: ServicesDep, caller: CallerDep, response: Response
 ) -> RenderBody:
     """Queue a batch; all looks are validated first."""
-    await run_in_threadpool(require_ready_bake, services, request.bake)
-    async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
-        max_bytes = await run_in_threadpool(_check, request, transfer)
-        if request.name is None:
+    services.webhooks.check(request.webhook)
+    queued = await run_in_threadpool(resolve_looks, request, services.looks, services.settings.max_body_bytes)
+    check_views(queued)
+    scene_names, warnings, max_bytes = dict[str, str](), dict[str, None](), 0
+    for bake in dict.fromkeys(bake for bake, _ in queued.bake_views):
+        await run_in_threadpool(require_ready_bake, services, bake)
+        async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
+            for view in (view for each, view in queued.bake_views if each == bake):
+                max_bytes += await run_in_threadpool(_check, queued, view, transfer)
+            warnings.update(dict.fromkeys(_light_mix_warnings(queued, transfer)))
             scene = await run_in_threadpool(get_scene, services.bakes.ledger, transfer.scene_id)
-            request.name = f"{scene.name} {request.view}"[:MAX_NAME]
-    identity = await run_in_threadpool(_queue, request, max_bytes, caller, services)
+            scene_names[bake] = scene.name
+    queued.warnings = list(warnings)[:MAX_WARNINGS]
+    if queued.name is None:
+        queued.name = f"{scene_names[queued.bake_views[0][0]]} {queued.view or ''}".strip()[:MAX_NAME]
+    queued.file_names = name_images(queued, scene_names)
+    queued.labels = label_images(queued) if queued.format == "contact_sheet" else []
+    identity = await run_in_threadpool(_queue, queued, max_bytes, caller, services)
     response.headers["Location"] = f"/api/renders/{identity}"
     return _body(await run_in_threadpool(services.renders.get, identity))
 
 
-def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Services) -> str:
+def _light_mix_warnings(request: QueuedRender, transfer: OpenBake) -> list[str]:
+    """Sentences about what the scene of a bake does not have of light mixes."""
+    return [text for partial in request.looks for text in expand_light_mix(partial, transfer.default_look)[1]]
+
+
+def _queue(request: QueuedRender, max_bytes: int, caller: Caller, services: Services) -> str:
     """Queue a batch that takes at most so many bytes. Raises QuotaError, NearlyFullError, BusyError."""
     identity = new_id()
     with services.access.quotas.planned(caller.name, "render", identity, max_bytes):
@@ -109,7 +131,8 @@ def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame
     return [CameraFrame.from_camera(camera) for camera in cameras] or None
 
 
-def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
+def _check_looks(request: Keyframes, transfer: OpenBake, pointers: Sequence[str] = ()) -> None:
+    """Check keyframes. pointers: JSON pointers of the looks, if they are not all in `looks`. Raises ParameterError."""
     if len(request.looks) > request.num_frames:
         value = Description(f"a list of {len(request.looks)} looks")
         raise ParameterError("looks", value, f"at most one look per frame, {request.num_frames} in total")
@@ -117,7 +140,7 @@ def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
         value = Description(f"a list of {len(request.durations)} durations")
         raise ParameterError("durations", value, f"{len(request.looks) - 1}, one from each look to the next")
     for index, partial in enumerate(request.looks):
-        check_look(partial, transfer, f"/looks/{index}")
+        check_look(partial, transfer, pointers[index] if pointers else f"/looks/{index}")
 
 
 def baked_view(name: str, transfer: OpenBake) -> Any:
@@ -156,13 +179,13 @@ def check_display(partial: dict[str, Any], pointer: str) -> None:
         raise ParameterError(f"{pointer}/display/tone_map", error.value, error.allowed) from None
 
 
-def _check(request: RenderRequest, transfer: OpenBake) -> int:
-    """Raise ParameterError if something cannot be rendered.
+def _check(request: QueuedRender, view_name: str, transfer: OpenBake) -> int:
+    """Raise ParameterError if something cannot be rendered in a view.
 
     Returns:
         Upper bound of the size of its files, bytes.
     """
-    view = baked_view(request.view, transfer)
+    view = baked_view(view_name, transfer)
     if request.format != "exr" and request.layers:
         raise ParameterError("layers", True, "false, because only EXR files have layers")
     if request.format != "exr" and request.aovs:
@@ -177,12 +200,13 @@ def _check(request: RenderRequest, transfer: OpenBake) -> int:
     elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
         allowed = f"at most {view.width}×{view.height}, the baked size; bake a larger size for more"
         raise ParameterError("size", list(request.size), allowed)
-    _check_looks(request, transfer)
+    pointers = look_pointers(request)
+    _check_looks(request, transfer, pointers)
     if request.format != "exr":
-        for index, partial in enumerate(request.looks):
-            check_display(partial, f"/looks/{index}")
-    check_animation(request, request.view, transfer)
-    look = look_at_frame(request, request.view, transfer, 0)
+        for pointer, partial in zip(pointers, request.looks, strict=True):
+            check_display(partial, pointer)
+    check_animation(request, view_name, transfer)
+    look = look_at_frame(request, view_name, transfer, 0)
     layers = make_layers(request.layers, look, has_indirect=EditAxis.BOUNCES in transfer.axes)
     return planned_bytes(request, request.size or (view.width, view.height), 1 + len(layers))
 
@@ -266,6 +290,20 @@ def get_video(render: Id, services: ServicesDep) -> Download:
     return Download(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(job))
 
 
+@router.get(
+    "/{render}/contact-sheet.png", response_class=Download, name="get_contact_sheet", responses=files("image/png")
+)
+def get_contact_sheet(render: Id, services: ServicesDep) -> Download:
+    """The finished batch as one image with names, if one was requested."""
+    job = services.renders.get(render)
+    if job.request.format != "contact_sheet":
+        raise NotFoundError(f"this batch has {job.request.format} images; submit one with format contact_sheet")
+    if job.state != "ready":
+        raise NotReadyError(f"the batch is not finished; {_state(job)}")
+    path = services.renders.sheet_path(job)
+    return Download(path, media_type="image/png", filename=services.renders.sheet_name(job))
+
+
 @router.get("/{render}/archive.zip", response_class=Download, name="get_archive", responses=files("application/zip"))
 def get_archive(render: Id, services: ServicesDep, partial: bool = False) -> Response:
     """All finished images in a ZIP; with `partial` before the batch is finished."""
@@ -296,5 +334,6 @@ def _state(job: RenderJob) -> str:
 
 def _body(job: RenderJob) -> RenderBody:
     request = job.request
-    request_fields = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
+    names = "bake", "view", "views", "name", "format", "size", "priority", "warnings"
+    request_fields = {name: getattr(request, name) for name in names}
     return RenderBody.from_object(job, **request_fields, **format_timestamps(job))

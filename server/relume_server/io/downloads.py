@@ -16,7 +16,6 @@ from starlette.types import Message, Receive, Scope, Send
 
 from relume_server.errors import RangeError
 
-_LONGEST = 120
 _CHUNK_BYTES = 1 << 18
 _RANGES = re.compile(
     rb"bytes=\s*(\d{1,99}-\d{0,99}|-\d{1,99})(\s*,\s*(\d{1,99}-\d{0,99}|-\d{1,99}))*\s*", re.IGNORECASE
@@ -96,8 +95,3 @@ def _zip_chunks(files: Sequence[tuple[Path, str]]) -> Iterator[bytes]:
 
 def _are_ranges(value: bytes) -> bool:
     return _RANGES.fullmatch(value) is not None and all(int(a) <= int(b) for a, b in _CLOSED_RANGE.findall(value))
-
-
-def safe_stem(text: str) -> str:
-    """Replace all characters except letters, digits, dots, dashes and underscores by dashes."""
-    return re.sub(r"[^\w.-]+", "-", text)[:_LONGEST].strip(".-") or "picture"

@@ -9,14 +9,15 @@ from pydantic import Field
 from relume.export.export_document import MAX_VARIANTS
 from relume_server.schemas.base import Body, Name
 
-ExportFormatName = Literal["glb", "materialx", "usd"]
+ExportFormatName = Literal["glb", "materialx", "usd", "light_mix"]
 
 
 class ExportRequest(Body):
     """A scene with a look as a file.
 
     `look`: a look document, may be partial. `saved_look`: the name of a saved look, instead. `variants`: names of
-    further saved looks, whose materials the file offers as variants.
+    further saved looks, whose materials the file offers as variants. `format` "light_mix": JSON with brightness and
+    color of lights by name, itself accepted as a look.
     """
 
     format: ExportFormatName = "glb"

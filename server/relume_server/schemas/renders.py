@@ -15,9 +15,13 @@ from relume_worker.job_state import JobState
 
 Side = Annotated[int, Field(ge=1, le=16384)]
 ImageFormat = Literal["exr", "png", "webp"]
-RenderFormat = Literal["exr", "png", "webp", "mp4"]
+RenderFormat = Literal["exr", "png", "webp", "mp4", "contact_sheet"]
 MAX_LOOKS = 1000
 MAX_FRAMES = 3600
+MAX_VIEWS = 64  # of one render
+MAX_FRAME_NUMBER = 10**8
+MAX_PRIORITY = 10
+MAX_WEBHOOK = 2048
 MAX_LISTED_FRAMES = 600  # frames per POST /api/renders/looks
 MAX_LISTED_BYTES = 16 << 20
 Duration = Annotated[float, Field(ge=1e-3, le=1e6, allow_inf_nan=False)]
@@ -112,23 +116,49 @@ class LooksBody(Body):
     crosses: str | None
 
 
-class RenderRequest(Animation):
-    """A batch of exact images; looks may be partial.
+class BakeView(Body):
+    """A view of a bake; `bake` null: that of the request."""
 
-    `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view.
+    view: Name
+    bake: Id | None = None
+
+
+class RenderRequest(Animation):
+    """A batch of exact images; looks may be partial, and light mixes.
+
+    `looks` are documents, `look_names` their names, and `saved_looks` names of saved looks, after them. `view` is the
+    view of `bake`; `views`, instead, are several, also of other bakes: all looks are rendered in each. `size`: at most
+    the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view.
+
+    `file_name`: name of each image with fields, such as "{scene}_{view}_{look}.{frame:04}.exr"; fields are `scene`,
+    `bake`, `view`, `look` and `frame`, a number with up to 9 digits. Frames, or looks without `frames` and `path`, are
+    numbered from `start_frame`; of an animation only each `frame_step`-th is rendered, and has its number.
+    `priority`: among renders of the same user, higher ones first. `webhook`: address that gets a signed message when
+    the render has ended, see docs/operations.md.
+
     Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light
     of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission,
     and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the
     server's OpenColorIO config (GET /api/color), by default linear Rec. 709.
 
     For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per
-    second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster.
+    second, "contact_sheet" one PNG of all images with their names. `quality`: "interactive" renders a free camera as it
+    looks while moving, about a hundred times faster.
     """
 
-    view: Name
+    looks: list[dict[str, Any]] = Field(default_factory=list, max_length=MAX_LOOKS)
+    look_names: list[Name] = Field(default_factory=list, max_length=MAX_LOOKS)
+    saved_looks: list[Name] = Field(default_factory=list, max_length=MAX_LOOKS)
+    view: Name | None = None
+    views: list[BakeView] = Field(default_factory=list, max_length=MAX_VIEWS)
     format: RenderFormat
     size: tuple[Side, Side] | None = None
     name: Name | None = None
+    file_name: Name | None = None
+    start_frame: Annotated[int, Field(ge=0, le=MAX_FRAME_NUMBER)] = 0
+    frame_step: Annotated[int, Field(ge=1, le=MAX_FRAMES)] = 1
+    priority: Annotated[int, Field(ge=-MAX_PRIORITY, le=MAX_PRIORITY)] = 0
+    webhook: Annotated[str, Field(max_length=MAX_WEBHOOK)] | None = None
     layers: Layering = False
     aovs: bool = False
     precision: Literal["half", "float"] = "half"
@@ -139,10 +169,47 @@ class RenderRequest(Animation):
     @property
     def picture_format(self) -> ImageFormat:
         """Image format of a single frame."""
-        return "png" if self.format == "mp4" else self.format
+        return "png" if self.format == "mp4" or self.format == "contact_sheet" else self.format
+
+    @property
+    def is_animation(self) -> bool:
+        """True if images are frames of one sequence, and not one for each look."""
+        return self.frames is not None or self.path is not None
+
+    @property
+    def frame_indices(self) -> range:
+        """Frames that are rendered in each view."""
+        return range(0, self.num_frames, self.frame_step)
+
+    @property
+    def bake_views(self) -> list[tuple[str, str]]:
+        """Bake and view of each group of images."""
+        return [(each.bake or self.bake, each.view) for each in self.views] or [(self.bake, self.view or "")]
+
+    @property
+    def num_images(self) -> int:
+        """Number of images of all views."""
+        return len(self.bake_views) * len(self.frame_indices)
+
+    def image(self, index: int) -> tuple[str, str, int]:
+        """Bake, view and frame of an image; all frames of a view follow each other."""
+        view, frame = divmod(index, len(self.frame_indices))
+        return *self.bake_views[view], self.frame_indices[frame]
 
 
-RENDER_PLACEHOLDER = RenderRequest(bake="0" * 16, view="unknown", looks=[{}], format="png")
+class QueuedRender(RenderRequest):
+    """A request whose looks are all documents, as it is stored.
+
+    `file_names`: of all images. `labels`: of all images of a contact sheet. `warnings`: a sentence for each thing that
+    is not as in the looks.
+    """
+
+    file_names: list[str] = Field(default_factory=list)
+    labels: list[str] = Field(default_factory=list)
+    warnings: list[str] = Field(default_factory=list)
+
+
+RENDER_PLACEHOLDER = QueuedRender(bake="0" * 16, view="unknown", looks=[{}], format="png")
 """Stands for requests in the database that cannot be read."""
 
 
@@ -150,16 +217,20 @@ class RenderBody(Body):
     """A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one.
 
     `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without
-    login. `created`, `started` and `ended` are times; null: not yet.
+    login. `view`: null if there are several `views`. `warnings`: a sentence for each part of a light mix that a scene
+    does not have. `created`, `started` and `ended` are times; null: not yet.
     """
 
     id: str
     name: str | None
     user: str
     bake: str
-    view: str
+    view: str | None
+    views: list[BakeView]
     format: RenderFormat
     size: tuple[int, int] | None
+    priority: int
+    warnings: list[str]
     state: JobState
     created: str
     started: str | None

@@ -49,6 +49,7 @@ class JobRow(Base):
         kind: name of its `Kind`. request: the body of the call as JSON; of a bake, its recipe.
         done: finished steps.
         client: who submitted it first; None in rows of older versions. is_first: somebody waits for it: it is small.
+        priority: higher ones are first among the jobs of a client.
         created, queued, started, ended: seconds since 1970; None: not yet, or in a row of an older version.
             queued: last time, if it was queued again.
         scene_id, plan, progress, phase, phase_since, rays_per_second, seconds_left, bytes: of bakes, see
@@ -69,6 +70,7 @@ class JobRow(Base):
     created: Mapped[float]
     client: Mapped[str | None] = mapped_column(default=None)
     is_first: Mapped[bool | None] = mapped_column(default=None)
+    priority: Mapped[int] = mapped_column(default=0, server_default="0")
     owner: Mapped[str | None] = mapped_column(default=None)
     heartbeat: Mapped[float | None] = mapped_column(default=None)
     started: Mapped[float | None] = mapped_column(default=None)

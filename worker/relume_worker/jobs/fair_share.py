@@ -15,6 +15,7 @@ class Waiting:
         client: user who submitted it. is_first: it is small. created: time of submission.
         num_elsewhere: work of its client that runs elsewhere, on other servers and machines.
         kind, lane: of a job, see `relume_worker.jobs.job.lane`.
+        priority: higher ones are first among the work of a client.
     """
 
     id: str
@@ -24,6 +25,7 @@ class Waiting:
     num_elsewhere: int = 0
     kind: str = ""
     lane: str = ""
+    priority: int = 0
 
 
 class FairShare:
@@ -50,7 +52,7 @@ class FairShare:
         times = {work.client: self._time(work.client) for work in waiting}
         self._earliest = min(times.values(), default=self._earliest)
         turns, num_before = dict[Waiting, tuple[bool, float, float]](), Counter[str]()
-        for work in sorted(waiting, key=lambda work: (not work.is_first, work.created)):
+        for work in sorted(waiting, key=lambda work: (not work.is_first, -work.priority, work.created)):
             num_turns = work.num_elsewhere + num_before[work.client]
             turn_time = times[work.client] + num_turns / self._weight(work.client)
             turns[work] = not work.is_first, turn_time, work.created

@@ -32,7 +32,7 @@ class FairSlots:
     def take(self, step: Step, is_needed: IsNeeded) -> Iterator[None]:
         """Wait for a slot, and hold it in the block. Raises CancelledError if the step is no longer needed."""
         ticket = next(self._tickets)
-        waiting = Waiting(str(ticket), step.client, step.is_first, ticket)
+        waiting = Waiting(str(ticket), step.client, step.is_first, ticket, priority=step.priority)
         num_slots = self._num_slots()  # asked outside the lock: it may ask the cluster
         with self._changed:
             self._waiting.append(waiting)

@@ -57,6 +57,10 @@ class JobKind(Kind, Generic[Request]):
     def run(self, run: JobRun[Request]) -> None:
         """Run the missing steps of a job. Raises CancelledError: the job is no longer wanted."""
 
+    def priority(self, request: Request) -> int:
+        """Higher ones are first among the jobs of a client."""
+        return 0
+
     def step_s(self, request: Request) -> float | None:
         """Seconds per step of earlier requests like this; None if unknown."""
         return None
@@ -69,7 +73,7 @@ class JobKind(Kind, Generic[Request]):
         folder, (is_first, step_s) = self.folder / job.id, (self.is_first(job.request), self.step_s(job.request))
         folder.mkdir(parents=True, exist_ok=True)
         claim(folder, self._service.ledger.owner)
-        run = JobRun(self._service, self.name, job, folder, is_first=is_first, step_s=step_s)
+        run = JobRun(self._service, self.name, job, folder, is_first=is_first, step_s=step_s, priority=work.priority)
         self._timers[job.id] = run.timer
         try:
             self.run(run)
@@ -119,6 +123,7 @@ class JobKind(Kind, Generic[Request]):
 
         text, is_first = request.model_dump_json(), self.is_first(request)
         row = JobRow(id=identity, kind=self.name, request=text, client=client, is_first=is_first)
+        row.priority = self.priority(request)
         self._service.ledger.add(row, prepare_folder)
         self._service.wake()
         return identity

@@ -143,8 +143,9 @@ class JobLedger:
             kinds: kinds of the jobs. running: those that this service runs already.
         """
         queued = func.coalesce(JobRow.queued, JobRow.created).label("queued")
-        columns = JobRow.id, JobRow.kind, JobRow.client, JobRow.is_first, JobRow.owner, JobRow.heartbeat, queued
-        query = select(*columns, epoch_s().label("now"))  # requests may be large
+        columns = JobRow.id, JobRow.kind, JobRow.client, JobRow.is_first, JobRow.priority
+        leases = JobRow.owner, JobRow.heartbeat, epoch_s().label("now")
+        query = select(*columns, *leases, queued)  # without requests, which may be large
         with self.sessions() as session:
             rows = session.execute(query.where(JobRow.state.in_(ACTIVE_STATES), JobRow.kind.in_(kinds))).all()
         free, num_elsewhere = [], Counter[tuple[str, str]]()
@@ -155,7 +156,16 @@ class JobLedger:
             elif row.id not in running:
                 free.append((row, client, row_lane))
         return [
-            Waiting(row.id, client, bool(row.is_first), row.queued, num_elsewhere[client, row_lane], row.kind, row_lane)
+            Waiting(
+                row.id,
+                client,
+                bool(row.is_first),
+                row.queued,
+                num_elsewhere[client, row_lane],
+                row.kind,
+                row_lane,
+                row.priority,
+            )
             for row, client, row_lane in free
         ]
 

@@ -23,14 +23,23 @@ class JobRun(Generic[Request]):
     """
 
     def __init__(
-        self, service: JobService, kind: str, job: Job[Request], folder: Path, *, is_first: bool, step_s: float | None
+        self,
+        service: JobService,
+        kind: str,
+        job: Job[Request],
+        folder: Path,
+        *,
+        is_first: bool,
+        step_s: float | None,
+        priority: int,
     ) -> None:
         """
         Args:
             service: runs the steps. kind: name of its kind. job: state of the job. folder: folder of its files.
             is_first: True if somebody waits for it. step_s: seconds per step of earlier jobs; None if unknown.
+            priority: among the jobs of its client.
         """
-        self._service, self._kind, self._is_first = service, kind, is_first
+        self._service, self._kind, self._is_first, self._priority = service, kind, is_first, priority
         self.job, self.folder, self.timer = job, folder, StepTimer(step_s)
         self._error: BaseException | None = None  # of the first step that failed
 
@@ -66,7 +75,7 @@ class JobRun(Generic[Request]):
         """
         check_disk_space(self.folder, num_bytes, f"the files of a {noun(self._kind)}")
         claim = str(self.folder), self._service.ledger.owner
-        step = Step(kind, self._is_first, values, claim, self.job.user)
+        step = Step(kind, self._is_first, values, claim, self.job.user, self._priority)
         return self._service.run_step(step, report, self.is_needed)
 
     def timed_step(self, index: int, kind: str, values: Mapping[str, Any]) -> Mapping[str, Any]:

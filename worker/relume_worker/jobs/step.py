@@ -20,6 +20,7 @@ class Step:
         values: arguments of the step; JSON.
         claim: folder and lease owner of its job, see `relume_worker.jobs.claim`; None: no job.
         client: who submitted the job; bulk work is shared fairly among clients.
+        priority: of the job among those of its client.
     """
 
     kind: str
@@ -27,6 +28,7 @@ class Step:
     values: Mapping[str, Any] = field(default_factory=dict)
     claim: tuple[str, str] | None = None
     client: str = ""
+    priority: int = 0
 
 
 class RunStep(Protocol):

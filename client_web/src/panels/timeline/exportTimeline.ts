@@ -7,7 +7,7 @@ import { FPS, numFrames, renderPath } from "./playback";
 
 /** `quality`: for free cameras. */
 export function exportAnimation(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
-  const looks = keyframes.value.map(({ look }) => completeLook(look)) as unknown as RenderRequest["looks"];
+  const looks = keyframes.value.map(({ look }) => completeLook(look)) as unknown as NonNullable<RenderRequest["looks"]>;
   const frames = Math.max(numFrames.value, looks.length);
   const camera = currentPose();
   const path = renderPath(currentPath.value, frames) ?? (camera === null ? null : { cameras: [camera] });

@@ -8,6 +8,7 @@ export const EXPORT_FORMATS: readonly { value: NonNullable<ExportFormat>; label:
   { value: "glb", label: "GLB", title: "glTF with lights, cameras and variants" },
   { value: "usd", label: "USD", title: "Package with lights, cameras, environment and variants" },
   { value: "materialx", label: "MaterialX", title: "OpenPBR materials and their images, without geometry" },
+  { value: "light_mix", label: "Light mix", title: "Intensities and colors of lights by name, as JSON" },
 ];
 
 const path = (scene: string) => `/api/scenes/${encodeURIComponent(scene)}/exports`;
