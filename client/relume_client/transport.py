@@ -111,10 +111,15 @@ class Transport:
         """Download a file into memory."""
         return (await self._call("GET", path)).content
 
-    async def download(self, path: str, target: Path) -> None:
-        """Download a file; an incomplete one never has the name of the target."""
+    async def download(self, path: str, target: Path, *, body: Mapping[str, Any] | None = None) -> None:
+        """Download a file; an incomplete one never has the name of the target.
+
+        Args:
+            path: below the address of the server. target: its folder is made.
+            body: JSON of a POST that returns the file; None for GET.
+        """
         target.parent.mkdir(parents=True, exist_ok=True)
-        content = await self.read(path)
+        content = (await self._call("GET" if body is None else "POST", path, json=body)).content
         with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as file:
             try:
                 file.write(content)

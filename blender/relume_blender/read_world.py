@@ -1,0 +1,76 @@
+"""The world of a Blender scene as an equirectangular map, rendered by Cycles with all its nodes.
+
+Its directions are those of relume's maps: the middle is +X, up is up.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+_SIZES = 1024, 4096  # pixels: of procedural worlds, and of the largest map
+_UNIFORM_WIDTH = 64
+
+
+def write_world(context: Any, path: Path) -> list[str]:
+    """Write the world of the scene as .exr; returns sentences about what is left out.
+
+    Raises:
+        RuntimeError: Cycles is switched off or cannot render.
+    """
+    world = context.scene.world
+    scene = bpy.data.scenes.new("relume world")
+    camera = bpy.data.cameras.new("relume world")
+    holder = bpy.data.objects.new("relume world", camera)
+    try:
+        scene.world = world
+        _look_along_x(scene, camera, holder)
+        _set_render(scene, _width(world), path)
+        bpy.ops.render.render(scene=scene.name, write_still=True)
+    finally:
+        bpy.data.scenes.remove(scene)
+        bpy.data.objects.remove(holder)
+        bpy.data.cameras.remove(camera)
+    if not path.is_file():
+        raise RuntimeError("the world could not be rendered; is the add-on Cycles Render Engine switched on?")
+    has_volume = world is not None and any(
+        node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in _nodes(world)
+    )
+    return ["The volume of the world is left out."] if has_volume else []
+
+
+def _look_along_x(scene: Any, camera: Any, holder: Any) -> None:
+    camera.type = "PANO"
+    panorama = camera if hasattr(camera, "panorama_type") else camera.cycles  # a property of Cycles before Blender 5
+    panorama.panorama_type = "EQUIRECTANGULAR"
+    holder.rotation_euler = (math.pi / 2, 0.0, -math.pi / 2)
+    scene.collection.objects.link(holder)
+    scene.camera = holder
+
+
+def _set_render(scene: Any, width: int, path: Path) -> None:
+    render = scene.render
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y, render.resolution_percentage = width, width // 2, 100
+    render.filepath, render.use_file_extension, render.film_transparent = str(path), False, False
+    render.image_settings.file_format = "OPEN_EXR"
+    render.image_settings.color_mode, render.image_settings.color_depth = "RGB", "32"
+    render.use_compositing = render.use_sequencer = False
+    cycles = scene.cycles
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling, cycles.device = 1, False, False, "CPU"
+    cycles.pixel_filter_type, cycles.filter_width, cycles.film_exposure = "BLACKMAN_HARRIS", 0.01, 1.0
+
+
+def _width(world: Any) -> int:
+    """Width of the map: of the largest image of the world."""
+    if world is None or not any(node.type.startswith("TEX") for node in _nodes(world)):
+        return _UNIFORM_WIDTH
+    widths = [node.image.size[0] for node in _nodes(world) if node.type == "TEX_ENVIRONMENT" and node.image]
+    return min(max([_SIZES[0], *widths]), _SIZES[1])
+
+
+def _nodes(world: Any) -> list[Any]:
+    return [] if world.node_tree is None else [*world.node_tree.nodes]
