@@ -60,11 +60,11 @@ class Glb:
         return struct.pack("<4sII", _MAGIC, 2, 12 + len(body)) + body
 
 
-def unique_names(names: Iterable[str], used: Iterable[str] = ()) -> list[str]:
+def unique_names(names: Iterable[str], used: Iterable[str] = (), separator: str = " ") -> list[str]:
     """Names that a server keeps as they are: printable, without / and ~, of 1 to 60 characters, and unique.
 
     Args:
-        names: any. used: those that are taken.
+        names: any. used: those that are taken. separator: text before the number of an equal name.
     """
     taken, unique = set(used), list[str]()
     for name in names:
@@ -73,7 +73,7 @@ def unique_names(names: Iterable[str], used: Iterable[str] = ()) -> list[str]:
         number, candidate = 1, plain
         while candidate in taken:
             number += 1
-            candidate = f"{plain} {number}"
+            candidate = f"{plain}{separator}{number}"
         taken.add(candidate)
         unique.append(candidate)
     return unique
@@ -83,7 +83,7 @@ def slugs(names: Iterable[str]) -> list[str]:
     """Names of cameras that a server keeps as they are: unique, of a to z, 0 to 9 and hyphens."""
     ascii_names = (unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower() for name in names)
     plain = [re.sub(r"[^a-z0-9]+", "-", name).strip("-")[: _SLUG - 4].strip("-") or "view" for name in ascii_names]
-    return [name.replace(" ", "-") for name in unique_names(plain)]
+    return unique_names(plain, separator="-")
 
 
 def add_lights(document: Json, lights: Mapping[str, Mapping[str, Any]]) -> None:
