@@ -131,12 +131,21 @@ def _apply_light(
     _set_strength(light, None if before is None else from_look(before), target, changed)
     _set_shape(light, target, changed, source)
     if "to_world" in changed:
-        scale = source.matrix_world.to_scale()
-        matrix = Matrix(target.to_world.tolist())
-        source.matrix_world = matrix @ Matrix.Diagonal((*scale, 1.0))
+        source.matrix_world = _placed(source.matrix_world, target)
     if before is None or before["enabled"] != after["enabled"]:
         source.hide_render = not after["enabled"]
     return []
+
+
+def _placed(former: Any, target: BlenderLight) -> Any:
+    """The matrix of a moved light; a point light has no direction, a sun no position, so that they keep theirs."""
+    position, rotation, scale = former.decompose()
+    matrix = Matrix(target.to_world.tolist())
+    return Matrix.LocRotScale(
+        position if target.type == "SUN" else matrix.to_translation(),
+        rotation if target.type == "POINT" else matrix.to_3x3(),
+        scale,
+    )
 
 
 def _set_strength(light: Any, before: BlenderLight | None, target: BlenderLight, changed: set[str]) -> None:

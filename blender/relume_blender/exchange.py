@@ -194,19 +194,22 @@ async def pull(client: AsyncClient, sent: Sent, name: str, report: Report) -> Pu
     report("Reading the look", 0.0)
     label, document = await _find_look(client, name)
     bake = await client.bake(sent.bake)
-    before, after = (await bake.look(look) for look in (sent.look, document))
-    old, new = before.to_document(), after.to_document()
-    old_lights, new_lights = (dict(look["lights"]) for look in (old, new))
+    old: Any = (await bake.look(sent.look)).to_document()
+    new: Any = (await bake.look(document)).to_document()
+    old_lights, new_lights = old["lights"], new["lights"]
     edited = {name for name, material in new["materials"].items() if material != old["materials"].get(name)}
     edited |= {
         light["material"] for name, light in new_lights.items() if light["kind"] == "mesh" and light != old_lights.get(name)
     }  # fmt: skip
     omitted = _omitted(old, new, edited)
-    materials = {}
+    materials = dict[str, dict[str, Value]]()
     if edited:
         report("Reading materials", 0.3)
         documents = await _exported_materials(client, sent, new)
         materials = {name: principled_values(documents[name]) for name in sorted(edited) if name in documents}
+        for name in materials.keys() & _brighter_than_images(new):
+            del materials[name]["Base Color"]  # the factor is in the pixels of the exported image
+            omitted.append(f"Material “{name}” is brighter than its image, which Blender's exporter cannot write.")
         omitted += [sentence for name in materials for sentence in fit_sentences(documents[name])]
     lights = {
         name: (old_lights.get(name), light)
@@ -237,6 +240,15 @@ async def _exported_materials(client: AsyncClient, sent: Sent, look: Any) -> dic
         await (await client.scene(sent.scene)).export(path, look)
         exported = Glb.from_bytes(path.read_bytes())
     return {material["name"]: material for material in exported.document.get("materials", ())}
+
+
+def _brighter_than_images(look: Any) -> set[str]:
+    """Materials whose images are multiplied by more than 1."""
+    return {
+        name
+        for name, material in look["materials"].items()
+        if any(term.get("texture") and max(term["color"]) > 1 for term in material["terms"] if term["model"] == "lambert")
+    }
 
 
 def _omitted(old: Any, new: Any, edited: set[str]) -> list[str]:

@@ -108,6 +108,22 @@ def add_lights(document: Json, lights: Mapping[str, Mapping[str, Any]]) -> None:
         document["extensionsUsed"] = sorted({*document.get("extensionsUsed", ()), _PUNCTUAL})
 
 
+def remove_empty_nodes(document: Json) -> None:
+    """Remove nodes that hold nothing, as Blender's exporter leaves them of lights."""
+    while True:
+        nodes = document.get("nodes", [])
+        full = [k for k, node in enumerate(nodes) if node.keys() & {"mesh", "camera", "children", "extensions"}]
+        if len(full) == len(nodes):
+            return
+        numbers = {index: number for number, index in enumerate(full)}
+        document["nodes"] = [nodes[index] for index in full]
+        for parent, member in [*((n, "children") for n in document["nodes"]), *((s, "nodes") for s in document["scenes"])]:
+            if member in parent:
+                parent[member] = [numbers[index] for index in parent[member] if index in numbers]
+                if not parent[member]:
+                    del parent[member]
+
+
 def _matrix(light: Mapping[str, Any]) -> list[float]:
     """Column-major; −Z is the direction of the light."""
     backward = -np.array(light.get("direction", (0.0, 0.0, -1.0)), np.float64)
@@ -122,6 +138,7 @@ def _matrix(light: Mapping[str, Any]) -> list[float]:
 def scene_key(glb: Glb) -> str:
     """Hash of all that a look cannot change: geometry, images, cameras, and which textures a material has."""
     document = copy.deepcopy(glb.document)
+    document.pop("extensionsUsed", None)
     colored = {
         primitive.get("material")
         for mesh in document.get("meshes", ())

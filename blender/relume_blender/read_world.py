@@ -58,6 +58,8 @@ def _set_render(scene: Any, width: int, path: Path) -> None:
     render.filepath, render.use_file_extension, render.film_transparent = str(path), False, False
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_mode, render.image_settings.color_depth = "RGB", "32"
+    for name in (each for each in dir(render) if each.startswith("use_stamp_")):
+        setattr(render, name, False)  # so that equal worlds are equal files
     render.use_compositing = render.use_sequencer = False
     cycles = scene.cycles
     cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling, cycles.device = 1, False, False, "CPU"

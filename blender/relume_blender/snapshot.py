@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-from .glb import Glb, Json, add_lights, scene_key, slugs, unique_names
+from .glb import Glb, Json, add_lights, remove_empty_nodes, scene_key, slugs, unique_names
 
 _MAX_SCENE_NAME = 100
 
@@ -96,6 +96,7 @@ def make_snapshot(
         omitted: sentences about what is left out.
     """
     glb = Glb.from_bytes(exported)
+    remove_empty_nodes(glb.document)
     material_names = _rename(glb.document.get("materials", []))
     names = unique_names(lights, material_names)  # an emissive material is a light of its name
     named_lights = dict(zip(names, lights.values(), strict=True))

@@ -1,5 +1,6 @@
 """Runs in the Python that has bpy: a small scene with materials, all kinds of lights, a world and a camera."""
 
+import json
 import math
 
 import bpy
@@ -75,9 +76,8 @@ def run(operator: str) -> dict:
     manager.relume_status = manager.relume_omitted = ""
     try:
         getattr(bpy.ops.relume, operator)()
-    except RuntimeError:  # bpy's form of reported errors
-        pass
-    import json
-
+    except RuntimeError as error:  # bpy's form of reported errors
+        if "Traceback" in str(error):
+            raise
     omitted = json.loads(manager.relume_omitted or "[]")
     return {"status": manager.relume_status, "omitted": omitted, "sent": bpy.context.scene.relume.sent}
