@@ -63,7 +63,9 @@ def build_client_wheel(folder: Path, version: str) -> None:
     """Build the wheel of relume_client alone."""
     with tempfile.TemporaryDirectory() as project:
         shutil.copytree(
-            ROOT / "client" / "relume_client", Path(project) / "relume_client", ignore=shutil.ignore_patterns("__pycache__")
+            ROOT / "client" / "relume_client",
+            Path(project) / "relume_client",
+            ignore=shutil.ignore_patterns("__pycache__"),
         )
         (Path(project) / "pyproject.toml").write_text(_CLIENT_PROJECT.format(version=version))
         with chdir(project):

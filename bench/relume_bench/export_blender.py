@@ -47,7 +47,9 @@ def measure(tiny: bool) -> list[Figure]:
     errors = {
         "base color": _error(before, after, "materials", "Base Color", _COLOR),
         "roughness": _error(before, after, "materials", "Roughness", _ROUGHNESS),
-        "metallic": float(np.abs(_values(after, "materials", "Metallic") - _values(before, "materials", "Metallic")).max()),
+        "metallic": float(
+            np.abs(_values(after, "materials", "Metallic") - _values(before, "materials", "Metallic")).max()
+        ),
         "light power": _error(before, after, "lights", "power", _LIGHT),
     }
     return [Figure(_NAME, max(errors.values()), "relative", {**errors, "materials": len(before["materials"])})]
@@ -57,10 +59,8 @@ def _blender(python: str, phase: str, url: str, folder: Path, argument: object) 
     """Run one phase in Blender; returns its values."""
     script = Path(__file__).with_name("peer_blender_exchange.py")
     paths = os.pathsep.join(str(_ROOT / name) for name in ("blender", "client"))
-    command = [python, "-W", "ignore", str(script), phase, url, str(folder), str(argument)]
-    subprocess.run(
-        command, check=True, timeout=900, env={**os.environ, "PYTHONPATH": paths}, stdout=subprocess.DEVNULL
-    )
+    command = [python, "-P", "-W", "ignore", str(script), phase, url, str(folder), str(argument)]
+    subprocess.run(command, check=True, timeout=900, env={**os.environ, "PYTHONPATH": paths}, stdout=subprocess.DEVNULL)
     result: dict[str, Any] = json.loads((folder / f"{phase}.json").read_text())
     return result
 

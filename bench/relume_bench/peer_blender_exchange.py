@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+
 import relume_blender
 
 LIGHTS: dict[str, dict[str, float]] = {
@@ -71,7 +72,8 @@ def state() -> dict[str, Any]:
         inputs = shader_of(material).inputs
         color = list(inputs["Base Color"].default_value)[:3]
         materials[material.name] = {
-            "Base Color": color, "Roughness": inputs["Roughness"].default_value, "Metallic": inputs["Metallic"].default_value,
+            "Base Color": color, "Roughness": inputs["Roughness"].default_value,
+            "Metallic": inputs["Metallic"].default_value,
         }  # fmt: skip
     lights = {each.name: {"power": each.data.energy} for each in bpy.data.objects if each.type == "LIGHT"}
     return {"materials": materials, "lights": lights, "sent": json.loads(bpy.context.scene.relume.sent)}

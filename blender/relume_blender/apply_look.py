@@ -109,9 +109,7 @@ def _insert_factor(tree: Any, socket: Any, *, is_color: bool) -> Any:
     return colors[1]
 
 
-def _apply_light(
-    scene: Any, blender_name: str | None, name: str, before: Json | None, after: Json
-) -> list[str]:
+def _apply_light(scene: Any, blender_name: str | None, name: str, before: Json | None, after: Json) -> list[str]:
     source = None if blender_name is None else scene.objects.get(blender_name)
     if source is None and before is not None:
         return [f"There is no light “{name}” of its own any more: its changes are left out."]

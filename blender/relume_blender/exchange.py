@@ -198,9 +198,8 @@ async def pull(client: AsyncClient, sent: Sent, name: str, report: Report) -> Pu
     new: Any = (await bake.look(document)).to_document()
     old_lights, new_lights = old["lights"], new["lights"]
     edited = {name for name, material in new["materials"].items() if material != old["materials"].get(name)}
-    edited |= {
-        light["material"] for name, light in new_lights.items() if light["kind"] == "mesh" and light != old_lights.get(name)
-    }  # fmt: skip
+    emitters = [(name, light) for name, light in new_lights.items() if light["kind"] == "mesh"]
+    edited |= {light["material"] for name, light in emitters if light != old_lights.get(name)}
     omitted = _omitted(old, new, edited)
     materials = dict[str, dict[str, Value]]()
     if edited:
@@ -247,16 +246,16 @@ def _brighter_than_images(look: Any) -> set[str]:
     return {
         name
         for name, material in look["materials"].items()
-        if any(term.get("texture") and max(term["color"]) > 1 for term in material["terms"] if term["model"] == "lambert")
+        if any(
+            term.get("texture") and max(term["color"]) > 1 for term in material["terms"] if term["model"] == "lambert"
+        )
     }
 
 
 def _omitted(old: Any, new: Any, edited: set[str]) -> list[str]:
     """Sentences about changes of a look that are not pulled."""
-    sentences = []
-    for section in ("environment", "background", "display"):
-        if old[section] != new[section]:
-            sentences.append(f"The {section} of the look differs; it is not pulled.")
+    sections = [section for section in ("environment", "background", "display") if old[section] != new[section]]
+    sentences = [f"The {section} of the look differs; it is not pulled." for section in sections]
     for name in sorted(edited & new["materials"].keys()):
         images = [term.get(slot) for term in new["materials"][name]["terms"] for slot in ("texture", "roughness_map")]
         images.append((new["materials"][name].get("normal_map") or {}).get("image"))

@@ -117,7 +117,10 @@ def remove_empty_nodes(document: Json) -> None:
             return
         numbers = {index: number for number, index in enumerate(full)}
         document["nodes"] = [nodes[index] for index in full]
-        for parent, member in [*((n, "children") for n in document["nodes"]), *((s, "nodes") for s in document["scenes"])]:
+        for parent, member in [
+            *((n, "children") for n in document["nodes"]),
+            *((s, "nodes") for s in document["scenes"]),
+        ]:
             if member in parent:
                 parent[member] = [numbers[index] for index in parent[member] if index in numbers]
                 if not parent[member]:
@@ -194,7 +197,7 @@ def material_swatches(glb: Glb) -> Glb:
     attributes = {name: index for index, name in enumerate(arrays)}
     materials = document.get("materials", [])
     primitives = [{"attributes": attributes, "material": index} for index in range(len(materials))]
-    shared = {name: document[name] for name in ("textures", "samplers", "extensionsUsed") if name in document}
+    shared: Json = {name: document[name] for name in ("textures", "samplers", "extensionsUsed") if name in document}
     return Glb(
         {
             "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],

@@ -101,7 +101,13 @@ def from_look(light: Look) -> BlenderLight:
     inner, outer = (math.radians(angle) for angle in light.get("cone", (0.0, 0.0)))
     blend = (math.cos(inner) - math.cos(outer)) / (_EDGE * (1 - math.cos(outer))) if outer > 0 else 0.0
     return BlenderLight(
-        type_, strength * scale, color, to_world, 2 * outer, min(max(blend, 0.0), 1.0), (width, height)  # type: ignore[arg-type]
+        type_,
+        strength * scale,
+        color,
+        to_world,
+        2 * outer,
+        min(max(blend, 0.0), 1.0),
+        (width, height),
     )
 
 

@@ -11,14 +11,15 @@ _OBJECT_TYPES = {
     "POINTCLOUD": "point clouds", "LIGHT_PROBE": "light probes", "META": "metaballs",
 }  # fmt: skip
 _INPUTS = (
-    "Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Normal", "Specular IOR Level", "Specular Tint", "Anisotropic",
-    "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat Normal", "Sheen Weight", "Sheen Tint", "Sheen Roughness",
-    "Emission Color", "Emission Strength",
+    "Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Normal", "Specular IOR Level", "Specular Tint",
+    "Anisotropic", "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat Normal", "Sheen Weight", "Sheen Tint",
+    "Sheen Roughness", "Emission Color", "Emission Strength",
 )  # fmt: skip
 _WEIGHTS = {"Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
 _NODES = frozenset({
-    "TEX_IMAGE", "MIX", "MIX_RGB", "MATH", "NORMAL_MAP", "SEPARATE_COLOR", "SEPRGB", "VERTEX_COLOR", "ATTRIBUTE", "MAPPING",
-    "TEX_COORD", "UVMAP", "REROUTE", "RGB", "VALUE", "GROUP", "GROUP_INPUT", "VECT_MATH", "COMBXYZ", "SEPXYZ",
+    "TEX_IMAGE", "MIX", "MIX_RGB", "MATH", "NORMAL_MAP", "SEPARATE_COLOR", "SEPRGB", "VERTEX_COLOR", "ATTRIBUTE",
+    "MAPPING", "TEX_COORD", "UVMAP", "REROUTE", "RGB",
+    "VALUE", "GROUP", "GROUP_INPUT", "VECT_MATH", "COMBXYZ", "SEPXYZ",
 })  # fmt: skip
 _MAX_NAMES = 3
 

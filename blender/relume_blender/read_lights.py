@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import bpy
 import numpy as np
 
 from .glb import Json

@@ -13,6 +13,7 @@ import bpy
 
 _SIZES = 1024, 4096  # pixels: of procedural worlds, and of the largest map
 _UNIFORM_WIDTH = 64
+_NO_CYCLES = "The world could not be rendered: switch the add-on Cycles Render Engine on."
 
 
 def write_world(context: Any, path: Path) -> list[str]:
@@ -35,7 +36,7 @@ def write_world(context: Any, path: Path) -> list[str]:
         bpy.data.objects.remove(holder)
         bpy.data.cameras.remove(camera)
     if not path.is_file():
-        raise RuntimeError("the world could not be rendered; is the add-on Cycles Render Engine switched on?")
+        raise RuntimeError(_NO_CYCLES)
     has_volume = world is not None and any(
         node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in _nodes(world)
     )
@@ -53,7 +54,10 @@ def _look_along_x(scene: Any, camera: Any, holder: Any) -> None:
 
 def _set_render(scene: Any, width: int, path: Path) -> None:
     render = scene.render
-    render.engine = "CYCLES"
+    try:
+        render.engine = "CYCLES"
+    except TypeError:  # one of its add-ons
+        raise RuntimeError(_NO_CYCLES) from None
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, width // 2, 100
     render.filepath, render.use_file_extension, render.film_transparent = str(path), False, False
     render.image_settings.file_format = "OPEN_EXR"
@@ -70,7 +74,7 @@ def _width(world: Any) -> int:
     """Width of the map: of the largest image of the world."""
     if world is None or not any(node.type.startswith("TEX") for node in _nodes(world)):
         return _UNIFORM_WIDTH
-    widths = [node.image.size[0] for node in _nodes(world) if node.type == "TEX_ENVIRONMENT" and node.image]
+    widths = [int(node.image.size[0]) for node in _nodes(world) if node.type == "TEX_ENVIRONMENT" and node.image]
     return min(max([_SIZES[0], *widths]), _SIZES[1])
 
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from .glb import Glb, Json, add_lights, remove_empty_nodes, scene_key, slugs, unique_names
 

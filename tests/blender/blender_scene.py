@@ -55,7 +55,11 @@ def node_of(owner, kind: str):
 def values(name: str) -> dict:
     """Constants of a material's Principled BSDF."""
     sockets = node_of(bpy.data.materials[name], "BSDF_PRINCIPLED").inputs
-    return {s.name: list(s.default_value) if s.type == "RGBA" else s.default_value for s in sockets if s.type in ("RGBA", "VALUE")}
+    return {
+        s.name: list(s.default_value) if s.type == "RGBA" else s.default_value
+        for s in sockets
+        if s.type in ("RGBA", "VALUE")
+    }
 
 
 def lights() -> dict:
@@ -63,7 +67,8 @@ def lights() -> dict:
     fields = "energy", "size", "size_y", "spot_size", "spot_blend"
     return {
         each.name: {
-            "color": list(each.data.color), "matrix": [list(row) for row in each.matrix_world], "hidden": each.hide_render,
+            "color": list(each.data.color), "matrix": [list(row) for row in each.matrix_world],
+            "hidden": each.hide_render,
             **{field: getattr(each.data, field) for field in fields if hasattr(each.data, field)},
         }
         for each in bpy.data.objects if each.type == "LIGHT"

@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from relume_blender.background_task import BackgroundTask
-from relume_blender.glb import Glb, add_lights, material_swatches, scene_key, slugs, unique_names
-from relume_blender.lights import BlenderLight, changed_fields, from_look, to_look
-from relume_blender.snapshot import Sent, make_snapshot
-from relume_blender.surfaces import fit_sentences, principled_values
 
 from relume.lights.local_lights import rectangle
 from relume.look.model import LightGeometry
 from relume.scene.unique_names import unique_name
 from relume.scene_io.gltf.cameras import make_slug
 from relume.scene_io.import_scene import import_scene
+from relume_blender.background_task import BackgroundTask
+from relume_blender.glb import Glb, add_lights, material_swatches, scene_key, slugs, unique_names
+from relume_blender.lights import BlenderLight, changed_fields, from_look, to_look
+from relume_blender.snapshot import Sent, make_snapshot
+from relume_blender.surfaces import fit_sentences, principled_values
 
 NAMES = ["Key", "Key", "", "  ", "a/b~c", 'say "hi" \\', "灯 😀", "x" * 300, "x" * 299, "tab\there", "\ud800", "Key 2"]
 
@@ -38,7 +38,9 @@ LIGHTS = {
     "spot": BlenderLight("SPOT", 80.0, (1.0, 0.5, 0.2), TILTED, spot_size=0.8, spot_blend=0.3),
     "sun": BlenderLight("SUN", 3.0, (0.9, 1.0, 0.9), TILTED),
     "area": BlenderLight("AREA", 40.0, (1.0, 1.0, 0.5), TILTED, size=(1.0, 0.5)),
-    "down": BlenderLight("AREA", 40.0, (1.0, 1.0, 0.5), turned([0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, 0, 3]), size=(2.0, 1.0)),
+    "down": BlenderLight(
+        "AREA", 40.0, (1.0, 1.0, 0.5), turned([0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, 0, 3]), size=(2.0, 1.0)
+    ),
 }  # fmt: skip
 
 
@@ -48,7 +50,11 @@ def test_lights_come_back(name: str) -> None:
     back = from_look(to_look(light))
     ignored = {"to_world"} if light.type in ("POINT", "SUN", "SPOT") else set()
     assert changed_fields(light, back) - ignored == set()
-    np.testing.assert_allclose(back.to_world[:3, 2], light.to_world[:3, 2] * (light.type != "POINT") + [0, 0, light.type == "POINT"], atol=1e-12)
+    np.testing.assert_allclose(
+        back.to_world[:3, 2],
+        light.to_world[:3, 2] * (light.type != "POINT") + [0, 0, light.type == "POINT"],
+        atol=1e-12,
+    )
     assert light.type == "SUN" or np.allclose(back.to_world[:3, 3], light.to_world[:3, 3])
 
 
@@ -74,7 +80,8 @@ def test_spot_has_the_flux_of_blender() -> None:
 @pytest.mark.parametrize("name", ["area", "down"])
 def test_rectangles_have_the_edges_of_blender(name: str) -> None:
     light, look = LIGHTS[name], to_look(LIGHTS[name])
-    geometry = LightGeometry("rectangle", position=look["position"], direction=look["direction"], rotation=look["rotation"], size=tuple(look["size"]))  # fmt: skip
+    fields = {name: look[name] for name in ("position", "direction", "rotation", "size")}
+    geometry = LightGeometry("rectangle", **fields)
     _, edges = rectangle(geometry)
     x, y, z = light.to_world[:3, 1]
     height_axis = np.array([x, z, -y])
@@ -139,7 +146,11 @@ def test_key_is_of_what_a_look_cannot_change() -> None:
 def test_values_of_the_principled_bsdf() -> None:
     material = {
         "name": "Paint",
-        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.3},
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [0.5, 0.25, 0.125, 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": 0.3,
+        },
         "emissiveFactor": [1.0, 0.5, 0.0],
         "extensions": {
             "KHR_materials_ior": {"ior": 1.45},
@@ -154,8 +165,8 @@ def test_values_of_the_principled_bsdf() -> None:
     assert values == {
         "Base Color": (0.5, 0.25, 0.125), "Metallic": 0.0, "Roughness": 0.3, "IOR": 1.45, "Specular IOR Level": 0.3,
         "Specular Tint": (1.0, 0.9, 0.8), "Coat Weight": 0.7, "Coat Roughness": 0.1, "Sheen Weight": 0.2,
-        "Sheen Tint": (1.0, 0.5, 0.0), "Sheen Roughness": 0.4, "Emission Color": (1.0, 0.5, 0.0), "Emission Strength": 5.0,
-        "Anisotropic": 0.0, "Transmission Weight": 0.0,
+        "Sheen Tint": (1.0, 0.5, 0.0), "Sheen Roughness": 0.4, "Emission Color": (1.0, 0.5, 0.0),
+        "Emission Strength": 5.0, "Anisotropic": 0.0, "Transmission Weight": 0.0,
     }  # fmt: skip
     assert fit_sentences(material) == [
         "Material “Paint” is the nearest Principled BSDF, 16% off.", "The BTF is exported as its mean.",
@@ -187,7 +198,9 @@ def test_damaged_record_is_none(text: str) -> None:
 
 
 def test_record_comes_back() -> None:
-    sent = Sent("http://a", "1", "2", "http://a/?share=x", {"lights": {}}, "k", "e", {"A": "a"}, {}, {"A": {"name": "A"}})
+    sent = Sent(
+        "http://a", "1", "2", "http://a/?share=x", {"lights": {}}, "k", "e", {"A": "a"}, {}, {"A": {"name": "A"}}
+    )
     assert Sent.from_text(sent.to_text()) == sent
     assert json.loads(sent.to_text())["scene"] == "1"
 

@@ -46,7 +46,9 @@ def test_scene_has_the_right_lights_and_materials(blender: Blender, client: Clie
     assert bake.info["recipe"]["views"] == ["cam"]
     key, panel, sun, spot = (look["lights"][name] for name in ("Key", "Panel", "Sun", "Spot"))
     assert [key["kind"], panel["kind"], sun["kind"], spot["kind"]] == ["point", "rectangle", "directional", "spot"]
-    np.testing.assert_allclose(np.multiply(key["emission"], key["color"]), 60 / (4 * np.pi) * np.array([0.5, 0.4, 0.3]), 1e-5)
+    np.testing.assert_allclose(
+        np.multiply(key["emission"], key["color"]), 60 / (4 * np.pi) * np.array([0.5, 0.4, 0.3]), 1e-5
+    )
     np.testing.assert_allclose(key["position"], [1, 2, 2], atol=1e-6)
     np.testing.assert_allclose(panel["emission"], 40 / (np.pi * 0.5), 1e-5)
     np.testing.assert_allclose(sun["emission"], 0.5, 1e-5)
@@ -111,7 +113,8 @@ def test_factors_of_images_are_multiplied(blender: Blender, blender_server: Serv
         image.pack()
         tree = bpy.data.materials["Ball"].node_tree
         node = tree.nodes.new("ShaderNodeTexImage"); node.image = image
-        tree.links.new(node.outputs["Color"], node_of(bpy.data.materials["Ball"], "BSDF_PRINCIPLED").inputs["Base Color"])
+        shader = node_of(bpy.data.materials["Ball"], "BSDF_PRINCIPLED")
+        tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     """)
     sent = json.loads(blender.run("result = run('send')")["sent"])
     look = sent_look(client, sent)
