@@ -6,6 +6,8 @@ Blender loads the package under another name, so its modules import each other r
 
 from __future__ import annotations
 
+from types import ModuleType
+
 
 def register() -> None:
     """Add operators, panel and settings to Blender."""
@@ -31,7 +33,7 @@ def unregister() -> None:
         bpy.utils.unregister_class(each)
 
 
-def _classes(operators, panel):  # type: ignore[no-untyped-def]
+def _classes(operators: ModuleType, panel: ModuleType) -> tuple[type, ...]:
     return (
         panel.RelumePreferences, panel.RelumeSceneSettings, operators.RELUME_OT_send, operators.RELUME_OT_send_changes,
         operators.RELUME_OT_pull, operators.RELUME_OT_open, panel.RELUME_PT_panel,

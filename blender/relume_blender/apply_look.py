@@ -65,7 +65,7 @@ def _set_socket(tree: Any, socket: Any, value: Value) -> bool:
             return True
         factor = _insert_factor(tree, socket, is_color=is_color)
     if factor is None:
-        return node.type == "NORMAL_MAP"
+        return False
     _assign(factor, value)
     return True
 

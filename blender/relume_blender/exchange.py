@@ -65,7 +65,7 @@ async def send(client: AsyncClient, url: str, snapshot: Snapshot, settings: Bake
         if snapshot.views:
             options["views"] = snapshot.views
         bake = await scene.bake(settings.method, **options)
-        await bake.wait(progress=lambda body: report("Baking", 0.1 + 0.85 * body.get("progress", 0.0)))  # type: ignore[union-attr]
+        await bake.wait(progress=lambda body: report("Baking", 0.1 + 0.85 * body.get("progress", 0.0)))
         report("Sharing the look", 0.95)
         link = await bake.share(snapshot.look)
     except BaseException:

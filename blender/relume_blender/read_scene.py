@@ -15,8 +15,8 @@ from .snapshot import Snapshot, make_snapshot
 _TONE_MAPS = {"AgX": "agx", "Filmic": "filmic", "Standard": "none", "Raw": "none"}
 _EXPORT = {
     "export_format": "GLB", "use_active_scene": True, "use_renderable": True, "export_apply": True,
-    "export_cameras": True, "export_lights": False, "export_animations": False, "export_skins": False, "export_morph": False,
-    "export_gn_mesh": True, "export_extras": False, "export_yup": True,
+    "export_cameras": True, "export_lights": False, "export_animations": False, "export_skins": False,
+    "export_morph": False, "export_gn_mesh": True, "export_extras": False, "export_yup": True,
     "export_materials": "EXPORT",
 }  # fmt: skip
 
