@@ -128,9 +128,10 @@ async def _send_look(client: AsyncClient, snapshot: Snapshot, sent: Sent, report
         look["materials"] = {**look.get("materials", {}), **materials}
     look["lights"] = {**_without_removed(sent.look["lights"], snapshot), **look["lights"]}
     look["lights"] |= _emissions(sent.look["lights"], former, current)
+    look["environment"] = {**sent.look["environment"], **snapshot.look["environment"]}
     if snapshot.environment_key != sent.environment_key:
         report("Sending the environment", 0.5)
-        look["environment"] = {"map": await client.import_environment(snapshot.environment, name=snapshot.name)}
+        look["environment"]["map"] = await client.import_environment(snapshot.environment, name=snapshot.name)
     num_lights = sum(sent.look["lights"].get(name) != light for name, light in look["lights"].items())
     if look == sent.look:
         return sent, "Nothing has changed."
@@ -140,7 +141,7 @@ async def _send_look(client: AsyncClient, snapshot: Snapshot, sent: Sent, report
         sent, link=link, look=look, environment_key=snapshot.environment_key, materials=snapshot.materials,
         lights=snapshot.lights, material_documents=current,
     )  # fmt: skip
-    world = ", the world" if "environment" in look and look["environment"] != sent.look.get("environment") else ""
+    world = ", the world" if look["environment"] != sent.look["environment"] else ""
     return renewed, f"Sent {len(changed)} materials, {num_lights} lights{world}."
 
 

@@ -10,15 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 _SIZES = 1024, 4096  # pixels: of procedural worlds, and of the largest map
 _UNIFORM_WIDTH = 64
 _NO_CYCLES = "The world could not be rendered: switch the add-on Cycles Render Engine on."
 
 
-def write_world(context: Any, path: Path) -> list[str]:
-    """Write the world of the scene as .exr; returns sentences about what is left out.
+def write_world(context: Any, path: Path) -> tuple[float, list[str]]:
+    """Write the world of the scene as .exr.
 
+    Returns:
+        Intensity of the map: 0 for a black world, whose map is white because the server rejects a black one; and
+        sentences about what is left out.
     Raises:
         RuntimeError: Cycles is switched off or cannot render.
     """
@@ -40,7 +44,30 @@ def write_world(context: Any, path: Path) -> list[str]:
     has_volume = world is not None and any(
         node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in _nodes(world)
     )
-    return ["The volume of the world is left out."] if has_volume else []
+    intensity = 0.0 if _is_black(path) else 1.0
+    if intensity == 0:
+        _write_white(path)
+    return intensity, ["The volume of the world is left out."] if has_volume else []
+
+
+def _is_black(path: Path) -> bool:
+    image = bpy.data.images.load(str(path), check_existing=False)
+    try:
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        return not pixels.reshape(-1, image.channels)[:, :3].any()
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _write_white(path: Path) -> None:
+    image = bpy.data.images.new("relume world", _UNIFORM_WIDTH, _UNIFORM_WIDTH // 2, float_buffer=True)
+    try:
+        image.pixels.foreach_set(np.ones(len(image.pixels), np.float32))
+        image.file_format, image.filepath_raw = "OPEN_EXR", str(path)
+        image.save()
+    finally:
+        bpy.data.images.remove(image)
 
 
 def _look_along_x(scene: Any, camera: Any, holder: Any) -> None:

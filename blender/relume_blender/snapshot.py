@@ -20,7 +20,7 @@ class Snapshot:
 
     Attributes:
         name: of the scene. glb: with names that the server keeps. environment: path of its file.
-        look: lights and display, a partial look.
+        look: lights, display, and intensity of the environment, a partial look.
         views: names of the cameras to bake; none lets the server frame the scene.
         materials, lights: names of materials and of light objects in Blender, by their names in looks.
         key: of all that a look cannot change, the environment aside. environment_key: of the environment.
@@ -83,7 +83,7 @@ def make_snapshot(
     exported: bytes,
     environment: Path,
     lights: Mapping[str, Json],
-    display: Json,
+    sections: Json,
     active_camera: str | None,
     omitted: tuple[str, ...],
 ) -> Snapshot:
@@ -92,7 +92,7 @@ def make_snapshot(
     Args:
         name: of the scene. exported: a GLB file without lights. environment: .exr.
         lights: of a look, by name of their objects; of instances, a name that is no object's.
-        display: the look's. active_camera: name of its data in the file; None without one.
+        sections: display and environment of the look. active_camera: name of its data in the file; None without one.
         omitted: sentences about what is left out.
     """
     glb = Glb.from_bytes(exported)
@@ -108,7 +108,7 @@ def make_snapshot(
         name=printable or "Scene",
         glb=glb,
         environment=environment,
-        look={"lights": named_lights, "display": display},
+        look={"lights": named_lights, **sections},
         views=() if view is None else (view,),
         materials=material_names,
         lights=dict(zip(names, lights, strict=True)),

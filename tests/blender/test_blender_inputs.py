@@ -244,15 +244,39 @@ def test_world_image_has_its_strength_and_rotation(blender: Blender, tmp_path: P
         tree.links.new(texture.outputs["Color"], background.inputs["Color"])
         background.inputs["Strength"].default_value = 2.0
         path = Path({str(tmp_path)!r}) / "world.exr"
-        omitted = read_world.write_world(bpy.context, path)
+        intensity, omitted = read_world.write_world(bpy.context, path)
         written = bpy.data.images.load(str(path))
         written.colorspace_settings.name = "Non-Color"
         data = np.array(written.pixels[:]).reshape(written.size[1], written.size[0], -1)[..., :3]
         step = written.size[0] // 64
-        result = [data[step // 2 :: step, step // 2 :: step].tolist(), omitted]
+        result = [data[step // 2 :: step, step // 2 :: step].tolist(), [intensity, *omitted]]
     """)
-    assert warnings == []
+    assert warnings == [1.0]
     np.testing.assert_allclose(rows, 2 * np.roll(pixels, columns, axis=1), rtol=1e-3, atol=1e-4)
+
+
+def test_black_world_is_dark(blender: Blender, blender_server: Server) -> None:
+    """Also a scene without a world."""
+    sent = blender.run("make_scene(); bpy.context.scene.world = None; result = run('send')")
+    record = json.loads(sent["sent"])
+    client = Client(blender_server.url)
+    assert client.bake(record["bake"]).look(record["look"]).environment.intensity == 0
+    lit = blender.run("bpy.context.scene.world = bpy.data.worlds['World']; result = run('send_changes')")
+    again = json.loads(lit["sent"])
+    assert lit["status"] == "Sent 0 materials, 0 lights, the world."
+    assert client.bake(again["bake"]).look(again["look"]).environment.intensity == 1
+
+
+def test_missing_cycles_is_said(blender: Blender) -> None:
+    sent = blender.run("""
+        import addon_utils
+        make_scene()
+        addon_utils.disable("cycles")
+        result = run("send")
+        addon_utils.enable("cycles")
+    """)
+    assert sent["status"] == "The world could not be rendered: switch the add-on Cycles Render Engine on."
+    assert blender.run("result = [scene.name for scene in bpy.data.scenes]") == ["Scene"]
 
 
 def test_restarted_server_takes_changes(blender: Blender, blender_server: Server) -> None:
