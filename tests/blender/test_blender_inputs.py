@@ -111,8 +111,8 @@ def test_names_that_clash_or_are_odd_come_back(blender: Blender, blender_server:
     document = json.loads(json.dumps(bake.look(sent["look"]).to_document()))
     for number, (name, blender_name) in enumerate(sent["materials"].items()):
         if blender_name in names:
-            document["materials"][name]["terms"][1]["params"]["roughness"] = 0.1 + 0.1 * number
-            look["materials"][blender_name] = 0.1 + 0.1 * number
+            document["materials"][name]["terms"][1]["params"]["roughness"] = 0.11 + 0.1 * number
+            look["materials"][blender_name] = 0.11 + 0.1 * number
     link = bake.share(document)
     status = blender.run(f"bpy.context.scene.relume.look = {link!r}; result = run('pull')")["status"]
     assert status == "Pulled look of the link: 5 materials, 0 lights."
