@@ -35,16 +35,16 @@ def read_scene(context: Any, folder: Path) -> Snapshot:
     path = folder / "scene.glb"
     bpy.ops.export_scene.gltf(filepath=str(path), **_EXPORT)
     environment = folder / "world.exr"
-    intensity, world_sentences = write_world(context, environment)
+    world = write_world(context, environment)
     lights, light_sentences = read_lights(context)
     camera = scene.camera.data.name if scene.camera is not None and scene.camera.type == "CAMERA" else None
     display = {
         "exposure": min(max(scene.view_settings.exposure, -20.0), 20.0),
         "tone_map": _TONE_MAPS.get(scene.view_settings.view_transform, "agx"),
     }
-    sections = {"display": display, "environment": {"intensity": intensity}}
-    sentences = (*omissions(scene, used_materials(scene)), *world_sentences, *light_sentences)
-    return make_snapshot(scene.name, path.read_bytes(), environment, lights, sections, camera, sentences)
+    sections = {"display": display, "environment": {"intensity": world.intensity}}
+    sentences = (*omissions(scene, used_materials(scene)), *world.omitted, *light_sentences)
+    return make_snapshot(scene.name, path.read_bytes(), (environment, world.key), lights, sections, camera, sentences)
 
 
 def used_materials(scene: Any) -> list[Any]:

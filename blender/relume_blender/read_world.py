@@ -5,24 +5,37 @@ Its directions are those of relume's maps: the middle is +X, up is up.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 _SIZES = 1024, 4096  # pixels: of procedural worlds, and of the largest map
 _UNIFORM_WIDTH = 64
 _NO_CYCLES = "The world could not be rendered: switch the add-on Cycles Render Engine on."
 
 
-def write_world(context: Any, path: Path) -> tuple[float, list[str]]:
+class WorldMap(NamedTuple):
+    """A written map.
+
+    Attributes:
+        key: hash of its pixels; Cycles writes times into its files, so that those of equal worlds differ.
+        intensity: 0 for a black world, whose map is white because the server rejects a black one; else 1.
+        omitted: sentences about what is left out.
+    """
+
+    key: str
+    intensity: float
+    omitted: tuple[str, ...]
+
+
+def write_world(context: Any, path: Path) -> WorldMap:
     """Write the world of the scene as .exr.
 
-    Returns:
-        Intensity of the map: 0 for a black world, whose map is white because the server rejects a black one; and
-        sentences about what is left out.
     Raises:
         RuntimeError: Cycles is switched off or cannot render.
     """
@@ -44,18 +57,20 @@ def write_world(context: Any, path: Path) -> tuple[float, list[str]]:
     has_volume = world is not None and any(
         node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in _nodes(world)
     )
-    intensity = 0.0 if _is_black(path) else 1.0
-    if intensity == 0:
+    pixels = _read_pixels(path)
+    is_black = not pixels.any()
+    if is_black:
         _write_white(path)
-    return intensity, ["The volume of the world is left out."] if has_volume else []
+    omitted = ("The volume of the world is left out.",) if has_volume else ()
+    return WorldMap(hashlib.sha256(pixels.tobytes()).hexdigest(), 0.0 if is_black else 1.0, omitted)
 
 
-def _is_black(path: Path) -> bool:
+def _read_pixels(path: Path) -> NDArray[np.float32]:
     image = bpy.data.images.load(str(path), check_existing=False)
     try:
         pixels = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
-        return not pixels.reshape(-1, image.channels)[:, :3].any()
+        return np.ascontiguousarray(pixels.reshape(-1, image.channels)[:, :3])
     finally:
         bpy.data.images.remove(image)
 
@@ -89,8 +104,6 @@ def _set_render(scene: Any, width: int, path: Path) -> None:
     render.filepath, render.use_file_extension, render.film_transparent = str(path), False, False
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_mode, render.image_settings.color_depth = "RGB", "32"
-    for name in (each for each in dir(render) if each.startswith("use_stamp_")):
-        setattr(render, name, False)  # so that equal worlds are equal files
     render.use_compositing = render.use_sequencer = False
     cycles = scene.cycles
     cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling, cycles.device = 1, False, False, "CPU"

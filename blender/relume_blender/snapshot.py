@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -81,7 +80,7 @@ class Sent:
 def make_snapshot(
     name: str,
     exported: bytes,
-    environment: Path,
+    environment: tuple[Path, str],
     lights: Mapping[str, Json],
     sections: Json,
     active_camera: str | None,
@@ -90,7 +89,7 @@ def make_snapshot(
     """Return a snapshot.
 
     Args:
-        name: of the scene. exported: a GLB file without lights. environment: .exr.
+        name: of the scene. exported: a GLB file without lights. environment: .exr, and hash of its pixels.
         lights: of a look, by name of their objects; of instances, a name that is no object's.
         sections: display and environment of the look. active_camera: name of its data in the file; None without one.
         omitted: sentences about what is left out.
@@ -107,13 +106,13 @@ def make_snapshot(
     return Snapshot(
         name=printable or "Scene",
         glb=glb,
-        environment=environment,
+        environment=environment[0],
         look={"lights": named_lights, **sections},
         views=() if view is None else (view,),
         materials=material_names,
         lights=dict(zip(names, lights, strict=True)),
         key=key,
-        environment_key=hashlib.sha256(environment.read_bytes()).hexdigest(),
+        environment_key=environment[1],
         omitted=omitted,
     )
 

@@ -23,7 +23,12 @@ class Blender:
         worker = Path(__file__).with_name("blender_worker.py")
         self._log = log.open("wb")
         self._process = subprocess.Popen(
-            [python, str(worker), url], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True
+            [python, str(worker), url],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            text=True,
+            env={**os.environ, "PYTHONPATH": ""},
         )
 
     def run(self, source: str) -> Any:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -244,7 +246,7 @@ def test_world_image_has_its_strength_and_rotation(blender: Blender, tmp_path: P
         tree.links.new(texture.outputs["Color"], background.inputs["Color"])
         background.inputs["Strength"].default_value = 2.0
         path = Path({str(tmp_path)!r}) / "world.exr"
-        intensity, omitted = read_world.write_world(bpy.context, path)
+        key, intensity, omitted = read_world.write_world(bpy.context, path)
         written = bpy.data.images.load(str(path))
         written.colorspace_settings.name = "Non-Color"
         data = np.array(written.pixels[:]).reshape(written.size[1], written.size[0], -1)[..., :3]
@@ -298,16 +300,13 @@ def test_scene_that_the_server_deleted_is_sent_anew(blender: Blender, blender_se
 def test_extension_installs_without_network(blender_server: Server, tmp_path: Path) -> None:
     if not ADDON.is_file():
         pytest.skip("the extension is not built here (make blender-addon builds it)")
-    import os
-    import subprocess
-
     source = f"""
 import bpy
 print(bpy.ops.extensions.package_install_files(filepath={str(ADDON)!r}, repo="user_default", enable_on_install=True))
 import relume_client
 print("CLIENT", relume_client.__file__, hasattr(bpy.types.Scene, "relume"))
 """
-    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path), "PYTHONPATH": ""}
     command = [os.environ["RELUME_BLENDER_PYTHON"], "-c", source]
     output = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=True).stdout
     assert f"CLIENT {tmp_path}" in output

@@ -179,11 +179,10 @@ def test_values_of_the_principled_bsdf() -> None:
 def test_snapshot_names_materials_and_cameras(tmp_path: Path) -> None:
     glb = triangle({"name": "a/b"}, {}, {"name": "Key"})
     glb.document["cameras"] = [{"name": "Küche 1", "type": "perspective"}, {"name": "Top", "type": "orthographic"}]
-    (tmp_path / "w.exr").write_bytes(b"world")
 
     def snapshot(camera: str | None) -> Any:
         lights = {"Key": to_look(LIGHTS["point"])}
-        return make_snapshot("\n", glb.to_bytes(), tmp_path / "w.exr", lights, {}, camera, ())
+        return make_snapshot("\n", glb.to_bytes(), (tmp_path / "w.exr", "key"), lights, {}, camera, ())
 
     made = snapshot("Küche 1")
     assert (made.name, made.views) == ("Scene", ("kuche-1",))
