@@ -22,6 +22,7 @@ LIGHTS: dict[str, dict[str, float]] = {
 
 
 def main(phase: str, url: str, folder: str, argument: str) -> None:
+    """Run a phase: "send" or "pull", with the server's url, the folder of files, and the argument: COUNT or LINK."""
     relume_blender.register()
     if phase == "send":
         bpy.ops.wm.read_factory_settings(use_empty=True)

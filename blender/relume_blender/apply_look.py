@@ -21,7 +21,13 @@ _DISK = 2 / math.sqrt(math.pi)
 
 
 def apply_look(scene: Any, sent: Sent, look: PulledLook) -> list[str]:
-    """Change materials and lights of the scene; returns sentences about what could not be changed."""
+    """Change materials and lights of a scene.
+
+    Args:
+        scene: of Blender. sent: its record. look: to be applied.
+    Returns:
+        Sentences about what could not be changed.
+    """
     omitted = list[str]()
     for name, values in look.materials.items():
         omitted += _apply_material(sent.materials.get(name), name, values)

@@ -38,7 +38,7 @@ def sent_record(scene: Any) -> Sent | None:
 
 
 def omitted_sentences(context: Any) -> list[str]:
-    """What the last operator left out."""
+    """Sentences about what the last operator left out."""
     text = context.window_manager.relume_omitted
     return list(json.loads(text)) if text else []
 
@@ -179,7 +179,7 @@ class RELUME_OT_send(_ServerOperator, bpy.types.Operator):  # noqa: N801 - Blend
         return lambda client, report: send(client, url, self._snapshot, settings, report)
 
     def finish(self, context: Any, scene: Any, result: Sent) -> str:
-        """Store the record."""
+        """Store the record. See `_ServerOperator`."""
         scene.relume.sent = result.to_text()
         return "The scene is in relume: open it in the browser."
 
@@ -196,7 +196,7 @@ class RELUME_OT_send_changes(_ServerOperator, bpy.types.Operator):  # noqa: N801
         return lambda client, report: send_changes(client, url, self._snapshot, sent, settings, report)
 
     def finish(self, context: Any, scene: Any, result: tuple[Sent, str]) -> str:
-        """Store the record."""
+        """Store the record. See `_ServerOperator`."""
         sent, sentence = result
         scene.relume.sent = sent.to_text()
         return sentence
@@ -218,7 +218,7 @@ class RELUME_OT_pull(_ServerOperator, bpy.types.Operator):  # noqa: N801 - Blend
         return lambda client, report: pull(client, sent, name, report)
 
     def finish(self, context: Any, scene: Any, result: PulledLook) -> str:
-        """Change materials and lights."""
+        """Change materials and lights. See `_ServerOperator`."""
         omitted = [*result.omitted, *apply_look(scene, self._sent, result)]
         context.window_manager.relume_omitted = json.dumps(omitted)
         return f"Pulled look {result.name}: {len(result.materials)} materials, {len(result.lights)} lights."

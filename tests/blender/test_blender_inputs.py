@@ -143,7 +143,7 @@ def test_left_out_parts_are_named(blender: Blender) -> None:
         result = run("send")
     """)
     text = "\n".join(sent["omitted"])
-    for part in (
+    for sentence in (
         "Base Color of material “Ball” comes from Noise Texture, which glTF cannot hold",
         "The subsurface scattering of material “Ball” is left out.",
         "material “Floor” has the shader Toon BSDF, not a Principled BSDF",
@@ -152,7 +152,7 @@ def test_left_out_parts_are_named(blender: Blender) -> None:
         "Area light “Panel” becomes a rectangle of the area of its ellipse.",
         "The depth of field of “Cam” is left out.",
     ):
-        assert part in text
+        assert sentence in text
 
 
 def test_modifiers_and_instances_are_sent(blender: Blender, blender_server: Server) -> None:

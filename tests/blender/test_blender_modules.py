@@ -122,8 +122,8 @@ def test_file_has_the_lights_of_the_look(tmp_path: Path) -> None:
     for name, fields in by_name.items():
         strength = np.multiply(looks[name]["emission"], looks[name]["color"])
         np.testing.assert_allclose(fields["emission"], strength, rtol=1e-6)
-        for place in ("position", "direction", "cone"):
-            np.testing.assert_allclose(fields.get(place, []), looks[name].get(place, []), atol=1e-6)
+        for field in ("position", "direction", "cone"):
+            np.testing.assert_allclose(fields.get(field, []), looks[name].get(field, []), atol=1e-6)
 
 
 def test_key_is_of_what_a_look_cannot_change() -> None:
