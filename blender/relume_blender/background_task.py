@@ -32,6 +32,7 @@ class BackgroundTask(Generic[Result]):
 
     def cancel(self) -> None:
         """Ask it to end; it cleans up first."""
+        self.text = "Canceling"
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._task.cancel)
 

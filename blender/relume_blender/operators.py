@@ -90,7 +90,6 @@ class _ServerOperator:
         manager = context.window_manager
         if event.type == "ESC" and event.value == "PRESS":
             self._task.cancel()
-            self._show(context, "Canceling…")
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}

@@ -14,14 +14,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = (
-    "relume",
-    "worker/relume_worker",
-    "server/relume_server",
-    "cli/relume_cli",
-    "client/relume_client",
-    "blender/relume_blender",
-)
+PACKAGES = ("relume", "worker/relume_worker", "server/relume_server", "cli/relume_cli", "client/relume_client")
 Graph = dict[str, set[str]]
 
 
