@@ -37,6 +37,7 @@ def apply_look(scene: Any, sent: Sent, look: PulledLook) -> list[str]:
         removed = scene.objects.get(sent.lights.get(name, ""))
         if removed is not None:
             removed.hide_render = removed.hide_viewport = True
+            omitted.append(f"Light “{removed.name}” is not part of the look: it is hidden.")
     return omitted
 
 

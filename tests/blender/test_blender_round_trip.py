@@ -105,6 +105,15 @@ def test_unedited_look_changes_nothing(blender: Blender, blender_server: Server,
     assert blender.run(state) == before
 
 
+def test_lights_that_a_look_lacks_are_hidden(blender: Blender, client: Client) -> None:
+    bake = client.bake(send(blender)["bake"])
+    link = bake.share()  # the look of the file, which has no area lights
+    pulled = blender.run(f"bpy.context.scene.relume.look = {link!r}; result = run('pull')")
+    assert pulled["omitted"] == ["Light “Panel” is not part of the look: it is hidden."]
+    hidden = blender.run("result = sorted(name for name, light in lights().items() if light['hidden'])")
+    assert hidden == ["Panel"]
+
+
 def test_factors_of_images_are_multiplied(blender: Blender, blender_server: Server, client: Client) -> None:
     blender.run("""
         make_scene()
