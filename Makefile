@@ -19,6 +19,7 @@ TESTS_STAMP := $(VENV)/.stamp-tests
 CLIENT_SOURCES := $(shell find client_web -type f -not -path '*/node_modules/*' -not -path '*/dist/*' 2>/dev/null)
 LOCK_TOOLS := build/lock-tools
 AUDIT_TOOLS := build/audit-tools
+BLENDER_TOOLS := build/blender-tools
 
 # Everything that is not slow; browser tests only where there is a browser.
 CHROMIUM := $(firstword $(foreach name,chromium chromium-browser google-chrome,$(shell command -v $(name) 2>/dev/null)))
@@ -33,7 +34,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # Bytecode is kept, whatever the shell says: tests start hundreds of processes, each of which would compile all sources.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-slow corpus bench soak wheel release lint audit lock clean client-check
+.PHONY: help setup demo test test-slow corpus bench soak wheel release blender-addon blender-check lint audit lock clean client-check
 
 help:  ## what each target does
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-12s %s\n", $$1, $$2}'
@@ -67,6 +68,13 @@ wheel: $(PROJECT_STAMP) $(CLIENT_BUILD)  ## the wheel, with the built editor, an
 
 release: $(PROJECT_STAMP) $(CLIENT_BUILD)  ## the same of a clean checkout whose VERSION the changelog names
 	$(BIN)/python scripts/build_distributions.py --release "$(or $(VERSION),$(error name it: make release VERSION=0.1.0))"
+
+blender-addon: $(PROJECT_STAMP)  ## the Blender add-on as an extension, in dist/
+	$(BIN)/python scripts/build_blender_addon.py
+
+# Blender as a Python module, which is large and under the GPL: never one of relume's own packages.
+blender-check: setup blender-addon $(BLENDER_TOOLS)/.stamp-bpy  ## the tests of the add-on in Blender
+	RELUME_BLENDER_PYTHON=$(CURDIR)/$(BLENDER_TOOLS)/bin/python $(ONE_THREAD) $(BIN)/python -m pytest tests/blender
 
 lint: $(PROJECT_STAMP)  ## style and types
 	$(BIN)/ruff check .
@@ -105,6 +113,13 @@ $(LOCK_TOOLS)/bin/uv:
 $(AUDIT_TOOLS)/bin/pip-audit:
 	@python="$$(.ci/find-python)" && "$$python" -m venv $(AUDIT_TOOLS)
 	@$(AUDIT_TOOLS)/bin/pip install --quiet pip-audit
+
+# This bpy needs exactly Python 3.11.
+$(BLENDER_TOOLS)/.stamp-bpy:
+	@command -v python3.11 >/dev/null || { echo "relume: the tests in Blender need python3.11 and its venv module." >&2; exit 1; }
+	@echo "Installing Blender as a Python module into $(BLENDER_TOOLS) …"
+	@python3.11 -m venv $(BLENDER_TOOLS) && $(BLENDER_TOOLS)/bin/pip install --quiet bpy==5.0.1 httpx websockets
+	@touch $@
 
 # The lock names all that is needed, so nothing is looked for; what is imported is compiled then, a part of all there is.
 $(PYTHON_STAMP): requirements.lock

@@ -98,7 +98,7 @@ def serving(data_folder: BakedFolder, settings: Mapping[str, str] | None = None)
         yield Server(port, process.pid, start_time, edits)
     finally:
         process.terminate()
-        process.wait(30)
+        process.wait(60)  # it stops by itself after 30 s, whatever it does
 
 
 def _wait(process: subprocess.Popen[bytes], port: int) -> None:

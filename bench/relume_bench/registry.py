@@ -123,6 +123,7 @@ GROUPS = (
     Group("relume_bench.import_clay", ("import.clay_s",)),
     Group("relume_bench.cryptomatte_file", ("export.cryptomatte_error",), is_quick=True),
     Group("relume_bench.export_round_trip", ("export.glb_rmse", "export.errors")),
+    Group("relume_bench.export_blender", ("export.blender_error",)),
     Group("relume_bench.render_workers", ("render.two_workers_speedup",)),
     Group("relume_bench.workers", ("bake.two_workers_speedup",)),
     Group("relume_bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),

@@ -46,6 +46,7 @@ TARGETS = {
     "assets.flip_p90": "≤ 0.08",
     "export.glb_rmse": "≤ 1 %",
     "export.errors": "≤ 0",
+    "export.blender_error": "≤ 1 %",
     "mirror.rmse": "≤ 10 %",
     "mirror.sharp_rmse": "≤ 5 %",
     "sharp.rmse_0.02": "≤ 4 %",

@@ -22,6 +22,7 @@ from relume_client.bodies import (
     BakeOptions,
     ImportOptions,
     LookDocument,
+    LookEntry,
     ModelBody,
     RenderBody,
     RenderOptions,
@@ -97,6 +98,26 @@ class AsyncClient:
             body = await self._transport.json("POST", "/api/scenes", data=to_json(options), files=parts)
         return AsyncScene(self._transport, body)
 
+    async def import_environment(self, file: str | os.PathLike[str], *, name: str = "") -> str:
+        """Import an environment, .hdr or .exr; returns its name for `environment.map` of looks."""
+        path = Path(file)
+        with path.open("rb") as opened:
+            parts = [("environment", (path.name, opened))]
+            body = await self._transport.json("POST", "/api/environments", data={"name": name}, files=parts)
+        return str(body["map"])
+
+    async def saved_looks(self) -> list[LookEntry]:
+        """Names and versions of the saved looks, newest first."""
+        return cast("list[LookEntry]", await self._transport.json("GET", "/api/looks"))
+
+    async def saved_look(self, name: str) -> LookDocument:
+        """A saved look by its name."""
+        return cast(LookDocument, await self._transport.json("GET", f"/api/looks/{quote(name, '')}"))
+
+    async def shared_look(self, id: str) -> LookDocument:  # noqa: A002
+        """The look of a share link by the id in its address, `/?share=<id>`."""
+        return cast(LookDocument, (await self._transport.json("GET", f"/api/shares/{quote(id, '')}"))["look"])
+
     async def example(self, name: str) -> AsyncScene:
         """A built-in scene by name, such as `still_life`."""
         return AsyncScene(self._transport, await self._transport.json("POST", f"/api/example-scenes/{quote(name, '')}"))
@@ -138,6 +159,22 @@ class AsyncScene:
         """
         request = to_json({"scene": self.id, "method": method, **options})
         return AsyncBake(self._transport, await self._transport.json("POST", "/api/bakes", body=request))
+
+    async def export(self, out: str | os.PathLike[str], look: AnyLook = {}) -> None:  # noqa: B006 - never changed
+        """Write the scene with a look as a file for other programs, as in docs/formats.md.
+
+        Args:
+            out: ends in .glb, .usdz, or .zip (MaterialX).
+            look: may be partial.
+        Raises:
+            ValueError: the ending is no format.
+        """
+        target = Path(out)
+        formats = {".glb": "glb", ".usdz": "usd", ".zip": "materialx"}
+        if target.suffix.lower() not in formats:
+            raise ValueError(f"{target} does not end in .glb, .usdz or .zip")
+        request = {"format": formats[target.suffix.lower()], "look": to_json(look)}
+        await self._transport.download(f"/api/scenes/{self.id}/exports", target, body=request)
 
     async def delete(self) -> None:
         """Delete the scene with its bakes."""
@@ -210,6 +247,17 @@ class AsyncBake(_AsyncJob[BakeBody]):
         request = {"bake": self.id, "looks": [to_json(changes)]}
         body = await self._transport.json("POST", "/api/renders/looks", body=request)
         return Look(body["looks"][0])
+
+    async def share(self, look: AnyLook = {}, *, view: str | None = None) -> str:  # noqa: B006 - never changed
+        """Create a share link of a look; returns its address, with that of the server.
+
+        Args:
+            look: may be partial. view: name of a view; by default the first.
+        """
+        name = self.info["recipe"]["views"][0] if view is None else view
+        request = to_json({"bake": self.id, "view": name, "views": [name], "look": look})
+        body = await self._transport.json("POST", "/api/shares", body=request)
+        return f"{self._transport.url}{body['url']}"
 
     async def submit(
         self, looks: Looks, image_format: str, *, view: str | None = None, **options: Unpack[RenderOptions]

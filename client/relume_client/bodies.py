@@ -314,6 +314,18 @@ class LookDocument(TypedDict):
     display: NotRequired[DisplayLook]
 
 
+class LookEntry(TypedDict):
+    """A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this
+    version's image, relative to the server, null if there is none."""
+
+    name: str
+    etag: str
+    created: str
+    modified: str
+    bytes: int
+    thumbnail: str | None
+
+
 class LooksBody(TypedDict):
     """Complete look and camera of each frame; cameras are null without a `path`."""
 

@@ -24,6 +24,8 @@ from relume_client.bodies import (
     BakeOptions,
     HelloMessage,
     ImportOptions,
+    LookDocument,
+    LookEntry,
     ModelBody,
     RenderBody,
     RenderOptions,
@@ -135,6 +137,22 @@ class Client:
         call = self._client.import_scene(file, environment=environment, companions=companions, **options)
         return Scene(self._thread, self._thread.run(call))
 
+    def import_environment(self, file: str | os.PathLike[str], *, name: str = "") -> str:
+        """Import an environment, .hdr or .exr; returns its name for `environment.map` of looks."""
+        return self._thread.run(self._client.import_environment(file, name=name))
+
+    def saved_looks(self) -> list[LookEntry]:
+        """Names and versions of the saved looks, newest first."""
+        return self._thread.run(self._client.saved_looks())
+
+    def saved_look(self, name: str) -> LookDocument:
+        """A saved look by its name."""
+        return self._thread.run(self._client.saved_look(name))
+
+    def shared_look(self, id: str) -> LookDocument:  # noqa: A002
+        """The look of a share link by the id in its address, `/?share=<id>`."""
+        return self._thread.run(self._client.shared_look(id))
+
     def example(self, name: str) -> Scene:
         """A built-in scene by name, such as `still_life`."""
         return Scene(self._thread, self._thread.run(self._client.example(name)))
@@ -176,6 +194,10 @@ class Scene:
         """Queue a bake. See `AsyncScene.bake`."""
         return Bake(self._thread, self._thread.run(self._scene.bake(method, **options)))
 
+    def export(self, out: str | os.PathLike[str], look: AnyLook | None = None) -> None:
+        """Write the scene with a look as a file for other programs. See `AsyncScene.export`."""
+        self._thread.run(self._scene.export(out, {} if look is None else look))
+
     def delete(self) -> None:
         """Delete the scene with its bakes."""
         self._thread.run(self._scene.delete())
@@ -213,6 +235,10 @@ class Bake:
     def look(self, changes: AnyLook | None = None) -> Look:
         """The scene's own look with changes, complete, to be edited without a session."""
         return self._thread.run(self._bake.look({} if changes is None else changes))
+
+    def share(self, look: AnyLook | None = None, *, view: str | None = None) -> str:
+        """Create a share link of a look; returns its address. See `AsyncBake.share`."""
+        return self._thread.run(self._bake.share({} if look is None else look, view=view))
 
     def render(
         self,

@@ -11,7 +11,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from relume_client.bodies import FrameHeader
 from relume_client.errors import ServerVersionError
@@ -97,5 +96,7 @@ def _linear_pixels(frame: Frame) -> NDArray[np.float32]:
 
 def decode_displayed(payload: bytes) -> NDArray[np.uint8]:
     """Decode a PNG, WebP or JPEG image. (height, width, 3) uint8"""
+    from PIL import Image  # not before: programs that decode no image, such as the Blender add-on, have no Pillow
+
     with Image.open(io.BytesIO(payload)) as image:
         return np.array(image.convert("RGB"))

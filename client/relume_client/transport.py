@@ -113,15 +113,23 @@ class Transport:
         """Download a file into memory."""
         return (await self._call("GET", path)).content
 
-    async def download(self, path: str, target: Path | None, folder: Path | None = None) -> Path:
+    async def download(
+        self,
+        path: str,
+        target: Path | None,
+        folder: Path | None = None,
+        *,
+        body: Mapping[str, Any] | None = None,
+    ) -> Path:
         """Download a file; an incomplete one never has the name of the target.
 
         Args:
             path: below the address of the server. target: file to write; None: the server's name in `folder`.
+            body: JSON of a POST that returns the file; None for GET.
         Raises:
             ServerVersionError: the name is missing, or is a path.
         """
-        response = await self._call("GET", path)
+        response = await self._call("GET" if body is None else "POST", path, json=body)
         target = (folder or Path()) / file_name(response) if target is None else target
         target.parent.mkdir(parents=True, exist_ok=True)
         content = response.content

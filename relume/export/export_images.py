@@ -19,6 +19,7 @@ from relume.scene_io.surfaces.surface_images import ImageInput
 U8 = NDArray[np.uint8]
 F64 = NDArray[np.float64]
 MakePixels = Callable[[], Shaped[U8, "height width channels"]]
+_ROUNDING = 1e-5  # of colors of terms
 
 
 class ExportImages:
@@ -57,9 +58,9 @@ def color_image(images: ExportImages, name: str, texture: Texture, factor: F64) 
         images: gets the image, with the bytes of the texture if possible. name: preferred.
         texture: colors of any encoding. factor: multiplies its values.
     """
-    if texture.encoding is not None and (scale := factor * texture.encoding.scale).max() <= 1:
+    if texture.encoding is not None and (scale := factor * texture.encoding.scale).max() <= 1 + _ROUNDING:
         file = images.add(name, ("bytes", id(texture)), lambda: texture.pixels)
-        return ImageInput(file, is_srgb=True, factor=rgb(scale), wrap=texture.wrap)
+        return ImageInput(file, is_srgb=True, factor=rgb(np.minimum(scale, 1)), wrap=texture.wrap)
 
     def values(rows: slice) -> NDArray[np.float32]:
         return np.asarray(decode(texture.pixels[rows], texture.encoding) * factor, np.float32)

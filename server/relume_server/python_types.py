@@ -32,7 +32,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal, NotRequired, TypedDict
 '''
-BODIES = "SceneBody", "BakeBody", "RenderBody", "LooksBody", "ModelBody", "Look", "CameraFrame"
+BODIES = "SceneBody", "BakeBody", "RenderBody", "LooksBody", "ModelBody", "Look", "LookEntry", "CameraFrame"
 OPTIONS: Mapping[str, tuple[str, frozenset[str]]] = {
     "ImportOptions": ("Body_import_scene", frozenset({"scene", "companions", "environment"})),
     "BakeOptions": ("BakeRequest", frozenset({"scene", "method", "dry_run"})),

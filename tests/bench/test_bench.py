@@ -35,7 +35,7 @@ LONG = [
     "probes_reference", "free_camera_accuracy", "free_camera_correction", "canvas_free_camera", "btf",
     "btf_accuracy", "btf_speed", "load", "btf_edit", "many_sessions", "refusal", "import_clay", "slider_drag",
     "free_camera_exact", "rotation", "btf_several", "btf_moving", "plan_disk", "probes_live", "probes_error", "assets",
-    "export_round_trip",
+    "export_round_trip", "export_blender",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
     "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits",
 ]  # fmt: skip

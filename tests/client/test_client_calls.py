@@ -49,7 +49,7 @@ def sigma_look(sigma: float) -> dict[str, Any]:
 
 
 def test_package_needs_nothing_of_the_server() -> None:
-    missing = ["relume", "numba", "embreex", "fastapi", "pydantic", "anywidget"]
+    missing = ["relume", "numba", "embreex", "fastapi", "pydantic", "anywidget", "PIL"]
     code = f"import sys; sys.modules.update(dict.fromkeys({missing})); import relume_client"
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": str(ROOT / "client")}, timeout=60)
 
@@ -98,6 +98,28 @@ def test_images_of_looks(bake: Bake) -> None:
     look = bake.look(sigma_look(0.4))
     look["Paper"].lambert.color = 0.1, 0.1, 0.1
     assert np.array_equal(bake.images(look)[0], displayed(0.5))
+
+
+def test_looks_are_shared_and_saved(running: Running, client: Client, bake: Bake) -> None:
+    link = bake.share(sigma_look(0.3))
+    address, _, share = link.partition("/?share=")
+    assert address == f"http://127.0.0.1:{running.port}"
+    shared = client.shared_look(share)
+    assert shared["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.3
+    assert client.saved_looks() == []
+    httpx.put(f"{address}/api/looks/Night%20-2", json=sigma_look(0.4)).raise_for_status()
+    assert [entry["name"] for entry in client.saved_looks()] == ["Night -2"]
+    assert client.saved_look("Night -2") == sigma_look(0.4)
+    with pytest.raises(ProblemError, match="gone"):
+        client.saved_look("gone")
+
+
+def test_scene_is_exported(client: Client, bake: Bake, tmp_path: Path) -> None:
+    scene = client.scene(bake.info["scene"])
+    scene.export(tmp_path / "new" / "a.glb", sigma_look(0.3))
+    assert (tmp_path / "new" / "a.glb").read_bytes()[:4] == b"glTF"
+    with pytest.raises(ValueError, match=r"does not end in \.glb"):
+        scene.export(tmp_path / "a.fbx")
 
 
 def test_renders_are_files(bake: Bake, tmp_path: Path) -> None:

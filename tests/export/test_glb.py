@@ -18,6 +18,7 @@ from relume.core import filesystem
 from relume.core.errors import DiskFullError, ParameterError, SceneError
 from relume.export import glb_buffer
 from relume.export.export_document import look_of_scene, prepare_export
+from relume.export.export_images import ExportImages, color_image
 from relume.export.export_scene import FORMATS, export_report, format_of
 from relume.export.write_glb import write_glb
 from relume.look import Look
@@ -232,6 +233,13 @@ def test_bright_textures_are_clamped_in_the_image_not_in_the_factor(tmp_path: Pa
     values = decode(again.textures["diffuse"].pixels, again.textures["diffuse"].encoding)
     assert values.max() == pytest.approx(1)
     assert values.min() == pytest.approx(1.8 * 0.1247, abs=0.01)
+
+
+def test_factor_above_one_by_rounding_stays_a_factor() -> None:
+    """Colors of terms have six digits."""
+    texture = srgb_texture(checker([[255, 255, 255], [99, 99, 99]]))
+    image = color_image(ExportImages(), "paper", texture, np.array([1 + 6e-7, 0.5, 0.25]))
+    assert image.factor == (1.0, 0.5, 0.25)
 
 
 def test_the_offset_is_given_back(tmp_path: Path) -> None:

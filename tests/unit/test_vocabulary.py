@@ -18,6 +18,7 @@ PACKAGES = {
     "cli": "cli/relume_cli",
     "client": "client/relume_client",
     "bench": "bench/relume_bench",
+    "blender": "blender/relume_blender",
 }
 SPOKEN = (
     *PACKAGES.values(),

@@ -19,7 +19,7 @@ LINE_STEP, MAX_INTERVAL_S, MIN_INTERVAL_S = 0.1, 30.0, 2.0
 class ReportProgress(Protocol):
     """Reports the fraction done, 0 to 1, and the current step as text."""
 
-    def __call__(self, share: float, detail: str = "") -> None: ...
+    def __call__(self, share: float, detail: str = "", /) -> None: ...
 
 
 def report_part(report: ReportProgress, index: int, total: int, detail: str) -> ReportProgress:
