@@ -91,6 +91,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/renders/{render}/frames/{index}/retry": {"POST": EDIT},
     "/api/renders/{render}/video.mp4": {"GET": VIEW},
     "/api/renders/{render}/archive.zip": {"GET": VIEW},
+    "/api/renders/{render}/contact-sheet.png": {"GET": VIEW},
     "/api/comparisons": {"GET": VIEW, "POST": EDIT},
     "/api/comparisons/{comparison}": {"GET": VIEW, "DELETE": EDIT},
     "/api/comparisons/{comparison}/resume": {"POST": EDIT},
