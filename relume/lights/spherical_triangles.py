@@ -72,7 +72,7 @@ class TriangleLights:
     def select(self, rows: Shaped[NDArray[np.intp], " N"], irradiance: Shaped[F32, "N 3"]) -> TriangleLights:
         """Select triangles, with new irradiance."""
         codes = None if self.codes is None else self.codes[rows]
-        return TriangleLights(self.nodes[:, :, rows], self.direction[rows], irradiance, codes=codes)
+        return TriangleLights(np.take(self.nodes, rows, axis=2), self.direction[rows], irradiance, codes=codes)
 
     @cached_property
     def nodes_by_light(self) -> Shaped[F32, "M 6 3"]:

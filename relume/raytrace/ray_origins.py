@@ -54,6 +54,7 @@ class OriginMesh(NamedTuple):
         Args:
             positions: of the vertices, meters. faces: vertex indices. normal: unit normals of the faces.
         """
+        faces = np.ascontiguousarray(faces)  # kernels are compiled for one layout
         offset, margin = np.empty(len(faces), np.float32), np.empty((len(faces), 3), np.float32)
 
         def compute(start: int, stop: int) -> None:

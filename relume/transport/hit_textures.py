@@ -97,7 +97,7 @@ def textured_light(
     """
     stored = np.isin(np.arange(len(TEXTURES)), slots)[:, None, None]
     by_texture = np.where(stored, isotropic * unit_share, 0).astype(np.float32)
-    plain = isotropic - (by_texture * mean).sum(axis=0)
+    plain = (isotropic - (by_texture * mean).sum(axis=0)).astype(np.float32)
     per_specular = np.where(stored[1], 1 / mean[1], 1).astype(np.float32)
     diffuse, specular = row_of_slot(slots, 0), row_of_slot(slots, 1)
     return TexturedLight(plain, by_texture[0], by_texture[1], per_specular, diffuse, specular)

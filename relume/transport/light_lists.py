@@ -107,7 +107,8 @@ class LightList:
     def _visible_clusters(self, subset: MergedParts, visible: Bits) -> Bits:
         """Return the merged lights that are visible at least in part, as bits; fractions are in `_visible_fraction`."""
         visible_fraction(visible, subset.group, subset.fraction, 0, len(visible), self._visible_fraction)
-        return np.packbits(self._visible_fraction[:, : len(visible)].T > 0, axis=1, bitorder="little")
+        is_visible = np.ascontiguousarray(self._visible_fraction[:, : len(visible)].T > 0)
+        return np.packbits(is_visible, axis=1, bitorder="little")
 
 
 class AreaLightList:

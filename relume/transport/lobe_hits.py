@@ -228,7 +228,7 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
     Returns:
         Number of paths.
     """
-    packet, lanes, end = new_packet(tracer), allocate_lanes(), 0
+    packet, lanes, end = new_packet(tracer), allocate_lanes(), np.int64(0)
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)

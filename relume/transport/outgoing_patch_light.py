@@ -104,7 +104,7 @@ def radiance_from_patch(
     basis = np.stack(variants).astype(np.float32), bin_means()
     args = *basis, isotropic_radiance[rows], extra_row, extra_radiance, _bin_areas(), is_positive
     parallel_for_chunks(lambda start, stop: _tabulate(*args, start, stop, scale, tables), len(rows))
-    return OutgoingLight(isotropic_radiance, lobe, frame, scale, tables[0], tables[-1])
+    return OutgoingLight(isotropic_radiance, lobe, np.ascontiguousarray(frame), scale, tables[0], tables[-1])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")

@@ -38,7 +38,7 @@ FINE, COARSE = (np.float32(1), _MAX_DEPTH - 1), (np.float32(8), 2)
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
 # NumPy integers, and no literals in kernel calls: a Python int would compile each kernel again
-_BEGIN, _MIDDLES, _WHOLE = np.int64(0), np.int64(3), (0, 1, 2)
+_BEGIN, _MIDDLES, _WHOLE = np.int64(0), np.int64(3), (np.int64(0), np.int64(1), np.int64(2))
 _BATCH = 16  # lights divided together
 # Loops are padded to a multiple of this: vectorized code and remainder loops round differently, and the result of a
 # triangle must not depend on which others are culled.
@@ -168,7 +168,7 @@ def _classify_triangles(triangles, num_triangles, level, fine, scratch, num):  #
         The new number of subtriangles, and the number of triangles to divide.
     """
     lists, bend = scratch.lists, scratch.bend
-    num_whole = num_quartered = num_divided = 0
+    num_whole = num_quartered = num_divided = _BEGIN
     max_whole_bend, last_level = fine
     max_quartered_bend, is_last = _QUARTERED_BEND * max_whole_bend, level == last_level
     for n in range(num_triangles):
@@ -317,7 +317,7 @@ def project_points(points, listed, shading, nodes, irradiance, curves, fine, sta
         for batch in range(0, num_divided, _BATCH):
             if num + _MAX_SUBTRIANGLES > subtriangles.entry.shape[0]:
                 add_subtriangles(subtriangles, num, listed, shading, begin, irradiance, curves, out[row])
-                num = 0
+                num = _BEGIN
             count = min(_BATCH, num_divided - batch)
             for n in range(count):
                 lists[2, n] = batches[batch + n]

@@ -70,6 +70,7 @@ def test_draco_with_impossible_counts_is_rejected_before_decoding(
     assert "claims more than its Draco data can contain" in rejected(glb.bytes())
 
 
+@pytest.mark.slow
 def test_extra_draco_attributes_are_rejected_within_the_memory_limit() -> None:
     points, face = np.zeros((60_000, 3), np.float32), np.array([[0, 1, 2]], np.uint32)
     options = {"quantization_bits": 1, "compression_level": 0, "preserve_order": True}

@@ -220,6 +220,7 @@ def test_a_material_preview_shows_its_images(client, uploaded):
         assert client.post(f"/api/scenes/{scene_id}/ball", json=requested).status_code in (404, 422)
 
 
+@pytest.mark.slow
 def test_a_session_equals_a_render_and_undo_restores_it(client, uploaded):
     services = client.app.state.services
     scene = register_scene(services.bakes.data_dir, services.bakes.ledger, still_life())

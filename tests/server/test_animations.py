@@ -53,6 +53,7 @@ def view(client: TestClient, bake: str) -> dict[str, Any]:
     return first_view
 
 
+@pytest.mark.slow
 def test_turntable_is_one_revolution_exact_or_interactive(
     client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -67,6 +68,7 @@ def test_turntable_is_one_revolution_exact_or_interactive(
     np.testing.assert_array_equal(exact[0], still)
 
 
+@pytest.mark.slow
 def test_turntable_rotates_the_object_or_the_environment(
     client: TestClient, scene: dict[str, Any], bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:

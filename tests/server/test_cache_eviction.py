@@ -106,6 +106,7 @@ def test_metrics_show_cache_bytes_by_bake(real_client: TestClient) -> None:
     assert sum(entries.values()) == gauges(real_client)["cache"]
 
 
+@pytest.mark.slow
 def test_thumbnail_of_another_version_is_rendered_again(
     real_client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -258,7 +258,7 @@ def test_rings_are_no_darker_than_the_light_they_belong_to(specular_share):
     mean, unit_share = np.ones((2, 65_536, 3), np.float32), np.zeros((2, 65_536, 3), np.float32)
     mean[1, 7:9], unit_share[1, 7:9] = 0.25, specular_share / 0.25
     hits = LobeHits(
-        np.tile(np.uint16([7, 8]), (NUM_POINTS, 28))[:, :55], np.zeros((NUM_POINTS, 7), np.uint8),
+        np.ascontiguousarray(np.tile(np.uint16([7, 8]), (NUM_POINTS, 28))[:, :55]), np.zeros((NUM_POINTS, 7), np.uint8),
         np.full((1, NUM_POINTS, 55), rgb9e5_pack(np.float32([3, 3, 3])), np.uint32), no_paths(NUM_POINTS, 1),
     )  # fmt: skip
     points = ref.make_receivers_at_origin(wo, normal, any_tangent(normal), np.zeros((NUM_POINTS, 1), np.uint8))

@@ -71,7 +71,7 @@ def _flush(packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no
 @nb.njit(nogil=True, cache=True)
 def _mark_occluded(tracer, geometry, start, stop, has_occluded_neighbor):  # type: ignore[no-untyped-def]
     """Trace along all edges of the grids of faces [start, stop)."""
-    packet, ends, num_pending = new_packet(tracer), np.empty((LANES, 2), np.uint32), 0
+    packet, ends, num_pending = new_packet(tracer), np.empty((LANES, 2), np.uint32), np.int64(0)
     origin, target = np.empty(3, np.float32), np.empty(3, np.float32)
     for f in range(start, stop):
         for side in range(2):
@@ -92,7 +92,7 @@ def _mark_occluded(tracer, geometry, start, stop, has_occluded_neighbor):  # typ
                         num_pending += 1
                         if num_pending == LANES:
                             _flush(packet, num_pending, ends, has_occluded_neighbor)
-                            num_pending = 0
+                            num_pending = np.int64(0)
     if num_pending:
         _flush(packet, num_pending, ends, has_occluded_neighbor)
 
@@ -131,7 +131,7 @@ def _grid_triangle(num_rows, u, v):  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True)
 def _reweight(tracer, geometry, has_occluded_neighbor, gbuffer, start, stop):  # type: ignore[no-untyped-def]
     """Trace to the nodes of rays [start, stop) that have a node with an occluded neighbor."""
-    packet, num_pending, (face, uv, _), directions = new_packet(tracer), 0, gbuffer.hits, gbuffer.directions
+    packet, num_pending, (face, uv, _), directions = new_packet(tracer), np.int64(0), gbuffer.hits, gbuffer.directions
     lattice_node, weight = gbuffer.lattice_node, gbuffer.weight
     origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.origins.normal
     for p in range(start, stop):
@@ -161,7 +161,7 @@ def _reweight(tracer, geometry, has_occluded_neighbor, gbuffer, start, stop):  #
         num_pending += 1
         if num_pending == _RAYS_PER_PACKET:
             _reweight_traced(packet, num_pending, weight)
-            num_pending = 0
+            num_pending = np.int64(0)
     if num_pending:
         _reweight_traced(packet, num_pending, weight)
 

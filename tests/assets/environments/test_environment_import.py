@@ -131,6 +131,7 @@ def render(client, bake, look, path):
     return OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.FLOAT)
 
 
+@pytest.mark.slow
 def test_a_comparison_uses_the_environment_of_the_look(client, imported, bake):
     request = {"bake": bake, "view": "front", "look": {"environment": {"map": imported["map"]}}, "passes": 2}
     url = client.post("/api/comparisons", json=request).headers["location"]

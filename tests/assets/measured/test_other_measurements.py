@@ -63,6 +63,7 @@ def test_rgl_spectra_become_rec709(tmp_path, tensors):
     assert relative_rms(planes, lambda wi, wo: brdf(wi, wo)[..., :1] * color, 70) < 0.02
 
 
+@pytest.mark.slow
 def test_anisotropic_rgl_file_becomes_its_mean_over_azimuths(tmp_path):
     quarter = np.linspace(-np.pi, -np.pi / 2, 7)
     file = make_tensors(lambda wi, wo: eval_brdf(BRUSHED, wi, wo), quarter, num_theta=14, size=32)

@@ -64,6 +64,7 @@ def comes_back(editor: Editor, before: NDArray[np.int16], left: int = 0) -> None
     wait_until(lambda: changed(before[:, left:], editor.pixels()[:, left:]) < 0.02, "the picture is not what it was")
 
 
+@pytest.mark.slow
 def test_every_gesture_moves_the_camera_twice(moving: Editor) -> None:
     page, box = moving.page, moving.canvas.bounding_box()
     assert box is not None

@@ -38,6 +38,7 @@ def scene_behind_glass(server: Server) -> Iterator[str]:
     server.delete(f"/api/scenes/{scene.id}")
 
 
+@pytest.mark.slow
 def test_glass_is_edited_by_keys_and_undone(kept_page: Page, server: Server, scene_behind_glass: str) -> None:
     page, editor = kept_page, Editor(kept_page)
     page.goto(f"{server.url}/?scene={scene_behind_glass}")

@@ -108,6 +108,7 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
     expect(page.get_by_text("use the OpenGL version")).to_be_visible()
 
 
+@pytest.mark.slow
 def test_an_image_of_emission_shines_and_lights_the_scene(editor: Editor, stripes: Path) -> None:
     """Dropped on an object; its light is in the list of lights; taken off and undone."""
     page = editor.page
