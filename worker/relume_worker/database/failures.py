@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 import math
 import sqlite3
+import sys
 import threading
 import time
 
-import pg8000
 from sqlalchemy import Engine, event
 from sqlalchemy.engine import ExceptionContext
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
@@ -65,7 +65,7 @@ def describe_error(error: BaseException) -> str:
 
 def _reply(cause: BaseException | None) -> dict[str, str]:
     """Fields of a PostgreSQL error message by letter; empty if the server has not answered."""
-    fields = cause.args[0] if isinstance(cause, pg8000.Error) and cause.args else None
+    fields = cause.args[0] if cause is not None and _is_of_driver(cause, "Error") and cause.args else None
     return fields if isinstance(fields, dict) else {}
 
 
@@ -76,7 +76,13 @@ def _state(cause: BaseException | None) -> str:
 
 def _is_unanswered(cause: BaseException | None) -> bool:
     state = _state(cause)
-    return state.startswith(_UNAVAILABLE_STATES) if state else isinstance(cause, pg8000.InterfaceError)
+    return state.startswith(_UNAVAILABLE_STATES) if state else _is_of_driver(cause, "InterfaceError")
+
+
+def _is_of_driver(cause: BaseException | None, kind: str) -> bool:
+    """True for an exception of pg8000, an optional package that is loaded with the first connection to PostgreSQL."""
+    driver = sys.modules.get("pg8000")
+    return driver is not None and isinstance(cause, getattr(driver, kind))
 
 
 class DatabaseError:
