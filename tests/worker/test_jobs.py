@@ -240,7 +240,9 @@ def test_steps_of_a_higher_priority_run_first_and_the_row_has_it(tmp_path: Path,
     may_begin.set()
     jobs.wait(last)
     jobs.service.close()
-    assert machine.done == [*"bbb", *"aaa", *"ccc"]
+    rest = machine.done[1:]  # any job may have the slot first
+    assert rest == sorted(rest, key="bac".index)
+    assert sorted(machine.done) == [*"aaa", *"bbb", *"ccc"]
 
 
 def test_job_is_deleted_if_the_ledger_has_no_disk_space(
