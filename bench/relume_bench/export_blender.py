@@ -33,7 +33,7 @@ def measure(tiny: bool) -> list[Figure]:
     """One bake, two runs of Blender."""
     python = os.environ.get("RELUME_BLENDER_PYTHON")
     if not python:
-        return skipped((_NAME,), "relative", "RELUME_BLENDER_PYTHON does not name a Python with bpy")
+        return skipped((_NAME,), "%", "RELUME_BLENDER_PYTHON does not name a Python with bpy")
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data"
         data.mkdir()
@@ -52,7 +52,7 @@ def measure(tiny: bool) -> list[Figure]:
         ),
         "light power": _error(before, after, "lights", "power", _LIGHT),
     }
-    return [Figure(_NAME, max(errors.values()), "relative", {**errors, "materials": len(before["materials"])})]
+    return [Figure(_NAME, 100 * max(errors.values()), "%", {**errors, "materials": len(before["materials"])})]
 
 
 def _blender(python: str, phase: str, url: str, folder: Path, argument: object) -> dict[str, Any]:
