@@ -3,15 +3,12 @@
 Five scenes of a ball on a checkered floor, with what glTF can express: glass, clear coat, sheen, textures (base color,
 roughness, normals, opacity), and lights (point, spot, directional, emissive). `export.glb_rmse` is the relative RMS
 difference of the pictures before and after, method `gather`, the worst of five; every scene is in the context.
-`export.errors`: errors that the validator of Khronos finds in the five files. RELUME_GLTF_VALIDATOR is the folder of
-its npm package gltf-validator.
+`export.errors`: errors that validators find in the five scenes as GLB, USD and MaterialX, see
+`relume_bench.export_validators`.
 """
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +21,7 @@ from numpy.typing import NDArray
 from relume.assets.environments.studio import studio
 from relume.core.cache import Cache
 from relume.export.export_document import look_of_scene, prepare_export
-from relume.export.write_glb import write_glb
+from relume.export.export_scene import FORMATS
 from relume.live.opened.openers import open_transfer
 from relume.look import validate
 from relume.output.render_image import render_image
@@ -36,6 +33,7 @@ from relume.scene.scene_folder import make_scene
 from relume.scene_io.import_scene import import_scene
 from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface, make_terms
 from relume.store.bake_protocol import Recipe
+from relume_bench.export_validators import count_glb_errors, count_materialx_errors, count_usd_errors
 from relume_bench.figure import Figure
 from relume_bench.gather import bake
 
@@ -44,10 +42,11 @@ U8 = NDArray[np.uint8]
 
 _SIZE, _LIGHTS = (320, 240), 400
 _SIDE = 64  # texels
-_VALIDATE = """
-require(process.argv[1]).validateBytes(new Uint8Array(require('fs').readFileSync(process.argv[2])))
-  .then(report => console.log(report.issues.numErrors));
-"""
+_COUNT_ERRORS: dict[str, Callable[[Path], int | None]] = {
+    "glb": count_glb_errors,
+    "usd": count_usd_errors,
+    "materialx": count_materialx_errors,
+}
 _GRAY_F0 = np.full(3, 0.04)
 _PLASTIC = PbrSurface(np.array([0.6, 0.25, 0.1]), _GRAY_F0, 1.0, 0.3, 0.043537)
 
@@ -56,30 +55,24 @@ def measure(tiny: bool) -> list[Figure]:
     """Two bakes a scene."""
     size, lights = ((32, 24), 20) if tiny else (_SIZE, _LIGHTS)
     errors: dict[str, float] = {}
-    invalid: list[int | None] = []
+    invalid: dict[str, list[int | None]] = {file_format: [] for file_format in _COUNT_ERRORS}
     with tempfile.TemporaryDirectory() as folder:
         for name, make in SCENES.items():
             scene = make()
-            path = Path(folder) / f"{name}.glb"
-            write_glb(prepare_export(scene, look_of_scene(scene, {}, "look")), path)
-            invalid.append(_num_errors(path))
-            again = import_scene(path, name, scene.environment)
+            export = prepare_export(scene, look_of_scene(scene, {}, "look"))
+            for file_format, count in _COUNT_ERRORS.items():
+                path = Path(folder) / f"{name}{FORMATS[file_format].suffix}"
+                FORMATS[file_format].write(export, path)
+                invalid[file_format].append(count(path))
+            again = import_scene(Path(folder) / f"{name}.glb", name, scene.environment)
             before, after = (_picture(each, size, lights, Path(folder)) for each in (scene, again))
             errors[name] = float(np.sqrt(np.mean((after - before) ** 2) / np.mean(before**2)))
     rmse = Figure("export.glb_rmse", max(errors.values()), "relative RMS", {"scenes": errors, "size": list(size)})
-    if None in invalid:
+    if None in invalid["glb"]:
         why = "RELUME_GLTF_VALIDATOR does not name the npm package gltf-validator"
         return [rmse, Figure("export.errors", None, "errors", {"skipped": why})]
-    return [rmse, Figure("export.errors", float(sum(filter(None, invalid))), "errors")]
-
-
-def _num_errors(path: Path) -> int | None:
-    """Errors in a file; None without the validator."""
-    validator = os.environ.get("RELUME_GLTF_VALIDATOR")
-    if not validator or shutil.which("node") is None:
-        return None
-    command = ["node", "-e", _VALIDATE, validator, str(path)]
-    return int(subprocess.run(command, capture_output=True, check=True, text=True, timeout=60).stdout)
+    sums = {file_format: sum(filter(None, counts)) for file_format, counts in invalid.items()}
+    return [rmse, Figure("export.errors", float(sum(sums.values())), "errors", {**sums, "files": len(SCENES)})]
 
 
 def _picture(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> F64:
