@@ -226,23 +226,22 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path, 
 
 
 def test_steps_of_a_higher_priority_run_first_and_the_row_has_it(tmp_path: Path, ledger: Ledger) -> None:
-    machine = Machine()
+    """A job holds the slot while an older and a more urgent one wait for it."""
+    machine, may_end = Machine(), threading.Event()
+    machine.before = lambda path, is_needed: wait_for(may_end.is_set)
     jobs = Jobs(ledger, tmp_path, machine)
-    jobs.submit("a", num=3)
-    urgent = jobs.frames.submit(Frames(name="b", num=3, priority=5))
-    last = jobs.frames.submit(Frames(name="c", num=3, priority=-5))
+    jobs.service.start()
+    jobs.submit("holder", num=1)
+    wait_for(lambda: len(machine.running) == 1)
+    older = jobs.submit("older", num=1)
+    urgent = jobs.frames.submit(Frames(name="urgent", num=1, priority=5))
     with ledger.sessions() as session:
         assert session.scalar(select(JobRow.priority).where(JobRow.id == urgent)) == 5
-    may_begin = threading.Event()
-    machine.before = lambda path, is_needed: wait_for(may_begin.is_set)
-    jobs.service.start()
-    wait_for(lambda: len(machine.slots._waiting) == 2)  # the first step has the slot
-    may_begin.set()
-    jobs.wait(last)
+    wait_for(lambda: len(machine.slots._waiting) == 2)
+    may_end.set()
+    jobs.wait(older)
     jobs.service.close()
-    rest = machine.done[1:]  # any job may have the slot first
-    assert rest == sorted(rest, key="bac".index)
-    assert sorted(machine.done) == [*"aaa", *"bbb", *"ccc"]
+    assert machine.done == ["holder", "urgent", "older"]
 
 
 def test_job_is_deleted_if_the_ledger_has_no_disk_space(
