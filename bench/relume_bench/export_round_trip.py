@@ -33,7 +33,7 @@ from relume.scene.scene_folder import make_scene
 from relume.scene_io.import_scene import import_scene
 from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface, make_terms
 from relume.store.bake_protocol import Recipe
-from relume_bench.export_validators import count_glb_errors, count_materialx_errors, count_usd_errors
+from relume_bench.export_validators import find_glb_errors, find_materialx_errors, find_usd_errors
 from relume_bench.figure import Figure
 from relume_bench.gather import bake
 
@@ -42,10 +42,10 @@ U8 = NDArray[np.uint8]
 
 _SIZE, _LIGHTS = (320, 240), 400
 _SIDE = 64  # texels
-_COUNT_ERRORS: dict[str, Callable[[Path], int | None]] = {
-    "glb": count_glb_errors,
-    "usd": count_usd_errors,
-    "materialx": count_materialx_errors,
+_FIND_ERRORS: dict[str, Callable[[Path], list[str] | None]] = {
+    "glb": find_glb_errors,
+    "usd": find_usd_errors,
+    "materialx": find_materialx_errors,
 }
 _GRAY_F0 = np.full(3, 0.04)
 _PLASTIC = PbrSurface(np.array([0.6, 0.25, 0.1]), _GRAY_F0, 1.0, 0.3, 0.043537)
@@ -55,23 +55,23 @@ def measure(tiny: bool) -> list[Figure]:
     """Two bakes a scene."""
     size, lights = ((32, 24), 20) if tiny else (_SIZE, _LIGHTS)
     errors: dict[str, float] = {}
-    invalid: dict[str, list[int | None]] = {file_format: [] for file_format in _COUNT_ERRORS}
+    found: dict[str, list[list[str] | None]] = {file_format: [] for file_format in _FIND_ERRORS}
     with tempfile.TemporaryDirectory() as folder:
         for name, make in SCENES.items():
             scene = make()
             export = prepare_export(scene, look_of_scene(scene, {}, "look"))
-            for file_format, count in _COUNT_ERRORS.items():
+            for file_format, find in _FIND_ERRORS.items():
                 path = Path(folder) / f"{name}{FORMATS[file_format].suffix}"
                 FORMATS[file_format].write(export, path)
-                invalid[file_format].append(count(path))
+                found[file_format].append(find(path))
             again = import_scene(Path(folder) / f"{name}.glb", name, scene.environment)
             before, after = (_picture(each, size, lights, Path(folder)) for each in (scene, again))
             errors[name] = float(np.sqrt(np.mean((after - before) ** 2) / np.mean(before**2)))
     rmse = Figure("export.glb_rmse", max(errors.values()), "relative RMS", {"scenes": errors, "size": list(size)})
-    if None in invalid["glb"]:
+    if None in found["glb"]:
         why = "RELUME_GLTF_VALIDATOR does not name the npm package gltf-validator"
         return [rmse, Figure("export.errors", None, "errors", {"skipped": why})]
-    sums = {file_format: sum(filter(None, counts)) for file_format, counts in invalid.items()}
+    sums = {file_format: sum(map(len, filter(None, lists))) for file_format, lists in found.items()}
     return [rmse, Figure("export.errors", float(sum(sums.values())), "errors", {**sums, "files": len(SCENES)})]
 
 

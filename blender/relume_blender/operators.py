@@ -32,6 +32,11 @@ def preferences(context: Any) -> Any:
     return context.preferences.addons[__package__].preferences
 
 
+def server_url(context: Any) -> str:
+    """Address of the server, without a slash at its end."""
+    return str(preferences(context).url.strip().rstrip("/"))
+
+
 def sent_record(scene: Any) -> Sent | None:
     """Record of what a server has of a scene."""
     return Sent.from_text(scene.relume.sent)
@@ -111,8 +116,7 @@ class _ServerOperator:
         context.window_manager.progress_end()
 
     def _begin(self, context: Any) -> bool:
-        settings = preferences(context)
-        url, token = settings.url.strip().rstrip("/"), settings.token.strip() or None
+        url, token = server_url(context), preferences(context).token.strip() or None
         self._scene = context.scene.name
         self._folder = tempfile.TemporaryDirectory(prefix="relume-")
         try:
@@ -174,7 +178,7 @@ class RELUME_OT_send(_ServerOperator, bpy.types.Operator):  # noqa: N801 - Blend
     def start(self, context: Any) -> Work:
         """Read the scene."""
         self._snapshot, settings = _read(context, self._folder.name), _bake_settings(context)
-        url = preferences(context).url.strip().rstrip("/")
+        url = server_url(context)
         return lambda client, report: send(client, url, self._snapshot, settings, report)
 
     def finish(self, context: Any, scene: Any, result: Sent) -> str:
@@ -191,7 +195,7 @@ class RELUME_OT_send_changes(_ServerOperator, bpy.types.Operator):  # noqa: N801
     def start(self, context: Any) -> Work:
         """Read the scene."""
         self._snapshot, settings = _read(context, self._folder.name), _bake_settings(context)
-        url, sent = preferences(context).url.strip().rstrip("/"), sent_record(context.scene)
+        url, sent = server_url(context), sent_record(context.scene)
         return lambda client, report: send_changes(client, url, self._snapshot, sent, settings, report)
 
     def finish(self, context: Any, scene: Any, result: tuple[Sent, str]) -> str:
@@ -211,7 +215,7 @@ class RELUME_OT_pull(_ServerOperator, bpy.types.Operator):  # noqa: N801 - Blend
         sent = sent_record(context.scene)
         if sent is None:
             raise ValueError("This scene was not sent yet: send it first.")
-        if sent.url != preferences(context).url.strip().rstrip("/"):
+        if sent.url != server_url(context):
             raise ValueError(f"This scene was sent to {sent.url}: send it to this server, or change the server.")
         self._sent, name = sent, context.scene.relume.look
         return lambda client, report: pull(client, sent, name, report)

@@ -181,7 +181,7 @@ class AsyncScene:
         await self._transport.json("DELETE", f"/api/scenes/{self.id}")
 
 
-class _AsyncJob(Generic[Body]):
+class AsyncJob(Generic[Body]):
     """Work of the server; `info` is its last known state."""
 
     _path: str
@@ -228,7 +228,7 @@ class _AsyncJob(Generic[Body]):
             await self.refresh()
 
 
-class AsyncBake(_AsyncJob[BakeBody]):
+class AsyncBake(AsyncJob[BakeBody]):
     """A bake of a scene: what looks are shown with."""
 
     _path, _label = "/api/bakes", "bake"
@@ -349,35 +349,36 @@ class AsyncBake(_AsyncJob[BakeBody]):
 
     async def delete(self) -> None:
         """Delete the bake in any state."""
-        await self._transport.json("DELETE", f"/api/bakes/{self.id}?delete_files=true")
+        await self._transport.json("DELETE", f"{self._path}/{self.id}?delete_files=true")
 
 
-class AsyncRender(_AsyncJob[RenderBody]):
+class AsyncRender(AsyncJob[RenderBody]):
     """A batch of images."""
 
     _path, _label = "/api/renders", "render"
 
     async def read(self, index: int) -> bytes:
         """The file of one image."""
-        return await self._transport.read(f"/api/renders/{self.id}/frames/{index}")
+        return await self._transport.read(self._frame_path(index))
+
+    def _frame_path(self, index: int) -> str:
+        return f"{self._path}/{self.id}/frames/{index}"
 
     async def save(self, target: Path) -> list[Path]:
         """Download all images; {} in the name of the target becomes their number. Videos and sheets are one file."""
         if single := {"mp4": "video.mp4", "contact_sheet": "contact-sheet.png"}.get(self.info["format"]):
-            return [await self._transport.download(f"/api/renders/{self.id}/{single}", target)]
+            return [await self._transport.download(f"{self._path}/{self.id}/{single}", target)]
         files = [Path(str(target).replace("{}", f"{index:04}")) for index in range(self.info["total"])]
-        for index, file in enumerate(files):
-            await self._transport.download(f"/api/renders/{self.id}/frames/{index}", file)
-        return files
+        return [await self._transport.download(self._frame_path(index), file) for index, file in enumerate(files)]
 
     async def save_named(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Download all images into a folder, with the names of the render."""
-        paths = [f"/api/renders/{self.id}/frames/{index}" for index in range(self.info["total"])]
+        paths = map(self._frame_path, range(self.info["total"]))
         return [await self._transport.download(path, None, Path(folder)) for path in paths]
 
     async def delete(self) -> None:
         """Delete the render and its images."""
-        await self._transport.json("DELETE", f"/api/renders/{self.id}")
+        await self._transport.json("DELETE", f"{self._path}/{self.id}")
 
 
 def _format(target: Path) -> str:

@@ -12,12 +12,22 @@ import weakref
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self, TypeVar, Unpack, overload
+from typing import Any, Generic, Literal, Self, TypeVar, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from relume_client.async_client import AnyLook, AsyncBake, AsyncClient, AsyncRender, AsyncScene, Looks, Progress
+from relume_client.async_client import (
+    AnyLook,
+    AsyncBake,
+    AsyncClient,
+    AsyncJob,
+    AsyncRender,
+    AsyncScene,
+    Body,
+    Looks,
+    Progress,
+)
 from relume_client.async_session import AsyncSession, Encoding, FrameListener
 from relume_client.bodies import (
     BakeBody,
@@ -203,30 +213,39 @@ class Scene:
         self._thread.run(self._scene.delete())
 
 
-class Bake:
-    """A bake of a scene: what looks are shown with."""
+class _Job(Generic[Body]):
+    """Work of the server. See `AsyncJob`."""
 
-    def __init__(self, thread: LoopThread, bake: AsyncBake) -> None:
-        self._thread, self._bake = thread, bake
+    def __init__(self, thread: LoopThread, job: AsyncJob[Body]) -> None:
+        self._thread = thread
+        self._job: AsyncJob[Body] = job
 
     @property
     def id(self) -> str:
         """Id on the server."""
-        return self._bake.id
+        return self._job.id
 
     @property
-    def info(self) -> BakeBody:
+    def info(self) -> Body:
         """The last known state."""
-        return self._bake.info
+        return self._job.info
 
-    def refresh(self) -> BakeBody:
+    def refresh(self) -> Body:
         """Read the state anew."""
-        return self._thread.run(self._bake.refresh())
+        return self._thread.run(self._job.refresh())
 
     def wait(self, *, progress: Progress = False, timeout: float | None = None) -> Self:
-        """Wait until it is ready. See `AsyncBake.wait`."""
-        self._thread.run(self._bake.wait(progress=progress, timeout=timeout))
+        """Wait until it is ready. See `AsyncJob.wait`."""
+        self._thread.run(self._job.wait(progress=progress, timeout=timeout))
         return self
+
+
+class Bake(_Job[BakeBody]):
+    """A bake of a scene: what looks are shown with."""
+
+    def __init__(self, thread: LoopThread, bake: AsyncBake) -> None:
+        super().__init__(thread, bake)
+        self._bake = bake
 
     def session(self, *, view: str | None = None, timeout: float = 120.0) -> Session:
         """A live session with this bake, for `with`. See `AsyncBake.session`."""
@@ -289,30 +308,12 @@ class Bake:
         self._thread.run(self._bake.delete())
 
 
-class Render:
+class Render(_Job[RenderBody]):
     """A batch of images."""
 
     def __init__(self, thread: LoopThread, render: AsyncRender) -> None:
-        self._thread, self._render = thread, render
-
-    @property
-    def id(self) -> str:
-        """Id on the server."""
-        return self._render.id
-
-    @property
-    def info(self) -> RenderBody:
-        """The last known state."""
-        return self._render.info
-
-    def refresh(self) -> RenderBody:
-        """Read the state anew."""
-        return self._thread.run(self._render.refresh())
-
-    def wait(self, *, progress: Progress = False, timeout: float | None = None) -> Self:
-        """Wait until it is ready. See `AsyncRender.wait`."""
-        self._thread.run(self._render.wait(progress=progress, timeout=timeout))
-        return self
+        super().__init__(thread, render)
+        self._render = render
 
     def save(self, target: str | os.PathLike[str]) -> list[Path]:
         """Download all images. See `AsyncRender.save`."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from project_scripts import load_script
 
 ROOT = Path(__file__).resolve().parents[2]
 LOCK = """# made by make lock
@@ -21,13 +21,7 @@ httpx==0.28 ; python_version >= '3.11' \\
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script, which is in no package."""
-    spec = importlib.util.spec_from_file_location("blender_addon", ROOT / "scripts" / "build_blender_addon.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("build_blender_addon")
 
 
 def test_requirements_have_the_hashes_of_the_lock(script: ModuleType) -> None:

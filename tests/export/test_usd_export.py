@@ -16,6 +16,7 @@ from relume.export.write_usd import write_usd
 from relume.scene.model import Light, Material, Scene
 from relume.scene_io.import_scene import import_scene
 from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface
+from relume_bench.export_validators import find_usd_errors
 
 pytest.importorskip("pxr", reason="needs the package usd-core")
 
@@ -25,20 +26,10 @@ def exported(path: Path, scene: Scene, look: dict[str, Any] | None = None, **var
     return import_scene(path, "again")
 
 
-def errors(path: Path) -> list[str]:
-    """Errors of all validators of USD; usd-core comes without MaterialX, so that it does not know its shaders."""
-    from pxr import Usd, UsdValidation
-
-    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-    findings = UsdValidation.ValidationContext(validators).Validate(Usd.Stage.Open(str(path)))
-    messages = [each.GetMessage() for each in findings if each.GetType() == UsdValidation.ValidationErrorType.Error]
-    return [message for message in messages if "shaderId 'ND_" not in message]
-
-
 def test_the_package_is_compliant(tmp_path: Path) -> None:
     red = {"materials": {"Metal": {"terms": [{"model": "lambert", "color": [0.8, 0.1, 0.1]}]}}}
     exported(tmp_path / "a.usdz", sample_scene(), {"lights": {"Panel": {"kind": "rectangle"}}}, red=red)
-    assert errors(tmp_path / "a.usdz") == []
+    assert find_usd_errors(tmp_path / "a.usdz") == []
 
 
 def test_geometry_cameras_and_lights_are_read_again(tmp_path: Path) -> None:
@@ -152,7 +143,7 @@ def test_any_name_is_written(tmp_path: Path, name: str) -> None:
     surface = PbrSurface(PLASTIC.diffuse, PLASTIC.f0, 1.0, 0.4, 0.0, texture)
     again = exported(tmp_path / "a.usdz", scene_of(Material(name, terms_of(surface), texture)))
     assert "diffuse" in again.materials[0].textures
-    assert errors(tmp_path / "a.usdz") == []
+    assert find_usd_errors(tmp_path / "a.usdz") == []
 
 
 def test_a_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

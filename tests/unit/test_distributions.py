@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
 import subprocess
 import tarfile
@@ -12,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from project_scripts import load_script
 
 ROOT = Path(__file__).parents[2]
 PAGE = '<script src="./assets/index-abc.js"></script>'
@@ -19,13 +19,7 @@ PAGE = '<script src="./assets/index-abc.js"></script>'
 
 @pytest.fixture(scope="module")
 def distributions() -> ModuleType:
-    """The script, which is in no package."""
-    spec = importlib.util.spec_from_file_location("distributions", ROOT / "scripts" / "build_distributions.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("build_distributions")
 
 
 @pytest.fixture(scope="module")

@@ -46,6 +46,7 @@ from relume_server.schemas.renders import (
     LooksRequest,
     QueuedRender,
     RenderBody,
+    RenderFormat,
     RenderRequest,
 )
 from relume_server.services import Services, ServicesDep
@@ -278,14 +279,20 @@ def get_frame(render: Id, index: FrameIndex, services: ServicesDep) -> Download:
     return Download(path, media_type=MEDIA_TYPES[job.request.picture_format], filename=name)
 
 
+def _finished_job(identity: str, render_format: RenderFormat, services: Services) -> RenderJob:
+    """A finished batch of a format that is one file. Raises NotFoundError, NotReadyError."""
+    job = services.renders.get(identity)
+    if job.request.format != render_format:
+        raise NotFoundError(f"this batch has {job.request.format} images; submit one with format {render_format}")
+    if job.state != "ready":
+        raise NotReadyError(f"the batch is not finished; {_state(job)}")
+    return job
+
+
 @router.get("/{render}/video.mp4", response_class=Download, name="get_video", responses=files("video/mp4"))
 def get_video(render: Id, services: ServicesDep) -> Download:
     """The finished batch as a video, if one was requested."""
-    job = services.renders.get(render)
-    if job.request.format != "mp4":
-        raise NotFoundError(f"this batch has {job.request.format} images; submit one with format mp4")
-    if job.state != "ready":
-        raise NotReadyError(f"the batch is not finished; {_state(job)}")
+    job = _finished_job(render, "mp4", services)
     path = services.renders.video_path(job)
     return Download(path, media_type=MEDIA_TYPES["mp4"], filename=services.renders.video_name(job))
 
@@ -295,11 +302,7 @@ def get_video(render: Id, services: ServicesDep) -> Download:
 )
 def get_contact_sheet(render: Id, services: ServicesDep) -> Download:
     """The finished batch as one image with names, if one was requested."""
-    job = services.renders.get(render)
-    if job.request.format != "contact_sheet":
-        raise NotFoundError(f"this batch has {job.request.format} images; submit one with format contact_sheet")
-    if job.state != "ready":
-        raise NotReadyError(f"the batch is not finished; {_state(job)}")
+    job = _finished_job(render, "contact_sheet", services)
     path = services.renders.sheet_path(job)
     return Download(path, media_type="image/png", filename=services.renders.sheet_name(job))
 
