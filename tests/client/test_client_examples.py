@@ -5,6 +5,7 @@ from __future__ import annotations
 import runpy
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +32,16 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture
 def run(url: str, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run an example with arguments; returns its variables."""
+    """Run an example with arguments; returns its variables.
+
+    It runs in a thread of its own: where browser tests share this process, theirs has an event loop that runs.
+    """
     monkeypatch.setenv("RELUME_URL", url)
 
     def run_example(name: str, *arguments: object) -> dict[str, Any]:
         monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
-        return runpy.run_path(str(EXAMPLES / name))
+        with ThreadPoolExecutor(max_workers=1) as thread:
+            return thread.submit(runpy.run_path, str(EXAMPLES / name)).result()
 
     return run_example
 
