@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from relume.core.color import luminance
 from relume.core.errors import ParameterError
 from relume.core.validation import names_text
 from relume.inverse_lighting.painting import PaintedTarget
@@ -15,17 +18,21 @@ from relume.inverse_lighting.report import Shortfall, residual, shortfalls
 from relume.inverse_lighting.solve import RIDGE, NormalEquations, solve_strengths
 from relume.inverse_lighting.sources import Sources, strength_changes
 
+F64 = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Match:
     """A solution.
 
     Attributes:
-        changes: changed fields by the JSON pointers of their sources. residual: relative RMS error of the marked
+        changes: changed fields by the JSON pointers of their sources. stops: change of their luminance; None from or to
+            black. residual: relative RMS error of the marked
             pixels; `residual_before`: that of the current look. shortfalls: parts that are not reached.
     """
 
     changes: dict[str, dict[str, Any]]
+    stops: dict[str, float | None]
     residual: float
     residual_before: float
     shortfalls: tuple[Shortfall, ...]
@@ -53,9 +60,17 @@ def match_lights(
     equations = NormalEquations.from_target(sources, painted.target)
     strengths = solve_strengths(sources, equations, is_free, changes_color=changes_color, ridge=ridge)
     radiance, marked = painted.target.radiance, painted.marked
+    changes = strength_changes(sources, strengths, changes_color=changes_color)
     return Match(
-        strength_changes(sources, strengths, changes_color=changes_color),
+        changes,
+        {pointer: _stops(sources, strengths, pointer) for pointer in changes},
         residual(sources.image(strengths), radiance, marked),
         residual(sources.image(sources.strengths), radiance, marked),
         tuple(shortfalls(sources, strengths, is_free, radiance, painted.parts)),
     )
+
+
+def _stops(sources: Sources, strengths: F64, pointer: str) -> float | None:
+    k = sources.pointers.index(pointer)
+    before, after = (float(luminance(each[k].astype(np.float32))) for each in (sources.strengths, strengths))
+    return math.log2(after / before) if min(before, after) > 0.0 else None

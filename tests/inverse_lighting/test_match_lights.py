@@ -91,7 +91,7 @@ def test_brighter_by_a_stop_doubles_the_only_light_there():
 
 
 def dim_except(sources, lit):
-    """The sources without a constant, where only one of them reaches the left top quarter, and that one nothing else."""
+    """The sources without a constant; only one of them reaches the left top quarter, and that one nothing else."""
     quarter = np.zeros(SIZE, bool)
     quarter[: HEIGHT // 2, : WIDTH // 2] = True
     for k in range(len(POINTERS)):
