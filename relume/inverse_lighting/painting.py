@@ -19,7 +19,10 @@ F32 = NDArray[np.float32]
 Xy = tuple[float, float]
 StrokeKind = Literal["brighter", "darker", "color", "reference"]
 HOLD = 0.1
-"""Weight of all pixels outside of strokes together, relative to all inside; they are to stay."""
+"""Weight of all pixels outside of strokes together, relative to all inside; they are to stay.
+
+None beside a `reference` stroke: its picture has other light everywhere.
+"""
 _FLOOR = 1e-3
 """Smallest luminance that a stroke makes brighter, relative to the mean of the image: twice black is black."""
 _SUBPIXELS = 4  # per side, of the mask of a brush
@@ -108,6 +111,8 @@ def painted_target(
         radiance = np.where(mask[..., None] > 0.0, _wanted(stroke, radiance, reference), radiance)
         masks = [earlier * (1 - mask) for earlier in masks] + [mask]
         uncovered = uncovered * (1 - mask)
+    if any(stroke.kind == "reference" for stroke in strokes):
+        hold = 0.0
     tone_weights = _tone_weights(image)
     parts = tuple(Part(stroke.kind, mask * tone_weights) for stroke, mask in zip(strokes, masks, strict=True))
     weights = tone_weights * (1 - uncovered + _hold_weights(uncovered, hold))

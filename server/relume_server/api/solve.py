@@ -20,6 +20,7 @@ from relume.live.fixed_camera.protocols import CameraMode, OpenBake
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.renders import baked_view, check_look, check_picture_size
 from relume_server.runtime.protocols import F32, Library
+from relume_server.schemas.message import PatchOperation
 from relume_server.schemas.solve import ShortfallBody, SolveBody, SolveRequest, SourceChange, StrokeBody
 from relume_server.services import ServicesDep
 
@@ -96,7 +97,7 @@ def _mask(stroke: StrokeBody, scale: tuple[float, float], small: tuple[int, int]
 def _body(request: SolveRequest, look: looks.Look, solved: LookMatch) -> SolveBody:
     match, has_strokes = solved.match, bool(request.strokes)
     return SolveBody(
-        patch=solved.operations,
+        patch=[PatchOperation(**operation) for operation in solved.operations],
         look=merge_changes(request.look, solved.operations),
         residual=match.residual,
         residual_before=match.residual_before,

@@ -9,6 +9,7 @@ from pydantic import Base64Bytes, Field
 from relume.inverse_lighting.painting import StrokeKind
 from relume_server.schemas.base import Body, Id, Name
 from relume_server.schemas.cameras import CameraFrame
+from relume_server.schemas.message import PatchOperation
 from relume_server.schemas.renders import Side
 
 MAX_STROKES = 64
@@ -93,7 +94,7 @@ class SolveBody(Body):
     `residual`, `residual_before`: relative RMS error of the marked pixels; 0 if none are marked.
     """
 
-    patch: list[dict[str, Any]]
+    patch: list[PatchOperation]
     look: dict[str, Any]
     residual: float
     residual_before: float
