@@ -11,9 +11,12 @@ import numpy as np
 from relume.inverse_lighting.match_lights import Match, match_lights
 from relume.inverse_lighting.painting import PaintedTarget, Stroke, painted_target
 from relume.inverse_lighting.reference_picture import match_exposure, read_reference
+from relume.inverse_lighting.solve import RIDGE
 from relume.inverse_lighting.sources import RenderLook, load_sources, replace_operations
 from relume.look import Look
 
+REFERENCE_RIDGE = 1e-6
+"""λ for a picture: its pixels tell apart what a stroke leaves open."""
 Size = tuple[int, int]
 MakeStrokes = Callable[[Size], Sequence[Stroke]]
 
@@ -55,7 +58,8 @@ def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMat
     sources = load_sources(look, render)
     image = sources.image(sources.strengths)
     painted = _painted(look, image, request)
-    match = match_lights(sources, painted, request.locked, changes_color=request.changes_color)
+    ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
+    match = match_lights(sources, painted, request.locked, changes_color=request.changes_color, ridge=ridge)
     return LookMatch(replace_operations(match.changes), match)
 
 
