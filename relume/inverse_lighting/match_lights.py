@@ -28,7 +28,7 @@ class Match:
     Attributes:
         changes: changed fields by the JSON pointers of their sources. stops: change of their luminance; None from or to
             black. residual: relative RMS error of the marked
-            pixels; `residual_before`: that of the current look. shortfalls: parts that are not reached.
+            pixels; `residual_before`: that of the current look. shortfalls: regions that are not reached.
     """
 
     changes: dict[str, dict[str, Any]]
@@ -66,7 +66,7 @@ def match_lights(
         {pointer: _stops(sources, strengths, pointer) for pointer in changes},
         residual(sources.image(strengths), radiance, marked),
         residual(sources.image(sources.strengths), radiance, marked),
-        tuple(shortfalls(sources, strengths, is_free, radiance, painted.parts)),
+        tuple(shortfalls(sources, strengths, is_free, radiance, painted.regions)),
     )
 
 

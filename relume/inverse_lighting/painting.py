@@ -67,8 +67,8 @@ def brush_mask(points: Sequence[Xy], radius: float, size: tuple[int, int]) -> Sh
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of a target: a stroke, or a whole reference picture. weights: of its pixels."""
+class Region:
+    """A region of a target: a stroke, or a whole reference picture. weights: of its pixels."""
 
     kind: StrokeKind
     weights: Shaped[F32, "height width"]
@@ -76,15 +76,15 @@ class Part:
 
 @dataclass(frozen=True)
 class PaintedTarget:
-    """A target, and its parts. target: its weights include the pixels that are to stay."""
+    """A target, and its regions. target: its weights include the pixels that are to stay."""
 
     target: Target
-    parts: tuple[Part, ...]
+    regions: tuple[Region, ...]
 
     @property
     def marked(self) -> Shaped[F32, "height width"]:
         """Weights of the pixels that are not only to stay."""
-        return sum((part.weights for part in self.parts), np.zeros_like(self.target.weights))
+        return sum((region.weights for region in self.regions), np.zeros_like(self.target.weights))
 
 
 def painted_target(
@@ -102,7 +102,7 @@ def painted_target(
     """
     if not strokes and reference is not None:
         weights = reference.weights * _tone_weights(reference.radiance)
-        return PaintedTarget(Target(reference.radiance, weights), (Part("reference", weights),))
+        return PaintedTarget(Target(reference.radiance, weights), (Region("reference", weights),))
     radiance, uncovered, masks = image, np.ones(image.shape[:2], np.float32), list[F32]()
     for stroke in strokes:
         if stroke.kind == "reference" and reference is None:
@@ -114,9 +114,9 @@ def painted_target(
     if any(stroke.kind == "reference" for stroke in strokes):
         hold = 0.0
     tone_weights = _tone_weights(image)
-    parts = tuple(Part(stroke.kind, mask * tone_weights) for stroke, mask in zip(strokes, masks, strict=True))
+    regions = tuple(Region(stroke.kind, mask * tone_weights) for stroke, mask in zip(strokes, masks, strict=True))
     weights = tone_weights * (1 - uncovered + _hold_weights(uncovered, hold))
-    return PaintedTarget(Target(radiance, weights), parts)
+    return PaintedTarget(Target(radiance, weights), regions)
 
 
 def _wanted(stroke: Stroke, radiance: F32, reference: Target | None) -> F32:

@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
-from relume.inverse_lighting.painting import Part
+from relume.inverse_lighting.painting import Region
 from relume.inverse_lighting.sources import Sources
 
 F32 = NDArray[np.float32]
@@ -22,21 +22,21 @@ MAX_MEAN_ERROR = 0.07
 """A stroke counts as reached if the relative error of its mean color is at most this, a tenth of a stop."""
 MAX_RESIDUAL = 0.1
 """A reference picture counts as reached up to this relative RMS error."""
-_LIT = 1e-4  # relative luminance that a light needs in a part to count there
+_LIT = 1e-4  # relative luminance that a light needs in a region to count there
 
 
 @dataclass(frozen=True)
 class Shortfall:
-    """A part of the target that cannot be reached.
+    """A region of the target that cannot be reached.
 
     Attributes:
-        part: its index. residual: relative RMS error.
+        region: its index. residual: relative RMS error.
         cause: all lights that reach it are `locked`; `no_light` reaches it; or the lights that do reach other pixels,
             too, and have other colors (`conflict`).
         asked_stops, reached_stops: change of its mean luminance; None if it was or becomes black.
     """
 
-    part: int
+    region: int
     residual: float
     cause: Cause
     asked_stops: float | None
@@ -63,28 +63,28 @@ def shortfalls(
     strengths: Shaped[F64, "sources 3"],
     is_free: Shaped[NDArray[np.bool_], " sources"],
     radiance: Shaped[F32, "height width 3"],
-    parts: Sequence[Part],
+    regions: Sequence[Region],
 ) -> list[Shortfall]:
-    """Return the parts of a target that are not reached.
+    """Return the regions of a target that are not reached.
 
     Args:
         sources: the sources. strengths: of the solution. is_free: as in `solve_strengths`.
-        radiance: of the target. parts: of the target.
+        radiance: of the target. regions: of the target.
     """
     before, after = sources.image(sources.strengths), sources.image(strengths)
     unreached = []
-    for k, part in enumerate(parts):
-        if not _is_reached(after, radiance, part):
-            asked, reached = (_stops(before, image, part.weights) for image in (radiance, after))
-            cause = _cause(sources, is_free, part.weights)
-            unreached.append(Shortfall(k, residual(after, radiance, part.weights), cause, asked, reached))
+    for k, region in enumerate(regions):
+        if not _is_reached(after, radiance, region):
+            asked, reached = (_stops(before, image, region.weights) for image in (radiance, after))
+            cause = _cause(sources, is_free, region.weights)
+            unreached.append(Shortfall(k, residual(after, radiance, region.weights), cause, asked, reached))
     return unreached
 
 
-def _is_reached(image: F32, radiance: F32, part: Part) -> bool:
-    if part.kind == "reference":
-        return residual(image, radiance, part.weights) <= MAX_RESIDUAL
-    difference, wanted = (_sum(each, part.weights) for each in (image - radiance, radiance))
+def _is_reached(image: F32, radiance: F32, region: Region) -> bool:
+    if region.kind == "reference":
+        return residual(image, radiance, region.weights) <= MAX_RESIDUAL
+    difference, wanted = (_sum(each, region.weights) for each in (image - radiance, radiance))
     return float(np.linalg.norm(difference)) <= MAX_MEAN_ERROR * float(np.linalg.norm(wanted))
 
 

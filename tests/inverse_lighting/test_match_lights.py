@@ -7,7 +7,7 @@ import pytest
 
 from relume.core.errors import ParameterError, ShapeMismatchError
 from relume.inverse_lighting.match_lights import match_lights
-from relume.inverse_lighting.painting import PaintedTarget, Part, Stroke, brush_mask, painted_target
+from relume.inverse_lighting.painting import PaintedTarget, Region, Stroke, brush_mask, painted_target
 from relume.inverse_lighting.solve import Target
 from relume.inverse_lighting.sources import Sources, merge_changes, replace_operations
 
@@ -30,7 +30,7 @@ def make_sources(intensities=(1.0, 1.0, 1.0, 1.0, 1.0), colors=None, *, seed=0):
 def whole(radiance, weights=None):
     """A target in which all pixels count equally."""
     weights = np.ones(SIZE, np.float32) if weights is None else weights
-    return PaintedTarget(Target(radiance, weights), (Part("reference", weights),))
+    return PaintedTarget(Target(radiance, weights), (Region("reference", weights),))
 
 
 def strengths_after(sources, match):
@@ -126,7 +126,7 @@ def test_all_locked_changes_nothing_and_says_so():
     stroke = Stroke("brighter", brush_mask([(5, 5)], 3, (WIDTH, HEIGHT)))
     match = match_lights(sources, painted_target([stroke], sources.image(sources.strengths)), POINTERS)
     assert match.changes == {}
-    assert [(s.part, s.cause) for s in match.shortfalls] == [(0, "locked")]
+    assert [(s.region, s.cause) for s in match.shortfalls] == [(0, "locked")]
     assert match.shortfalls[0].asked_stops == pytest.approx(1.0, abs=1e-3)
     assert match.shortfalls[0].reached_stops == 0.0
     assert match.residual == pytest.approx(0.5)
@@ -165,7 +165,7 @@ def test_later_strokes_paint_over_earlier_ones():
     mask = np.ones(SIZE, np.float32)
     target = painted_target([Stroke("brighter", mask, 2.0), Stroke("darker", mask, 1.0)], image)
     np.testing.assert_allclose(target.target.radiance, 2.0)
-    assert not target.parts[0].weights.any()
+    assert not target.regions[0].weights.any()
 
 
 def test_twin_lights_share_a_change():

@@ -11,7 +11,7 @@ from session_client import Baked
 
 from relume.image_io.write_image import png_bytes
 
-LAMP = {"kind": "point", "intensity": 1.0}
+KEY_LIGHT = {"kind": "point", "intensity": 1.0}
 LEFT, RIGHT = [[40.0, 48.0]], [[120.0, 48.0]]
 
 
@@ -24,7 +24,7 @@ def solve(client: TestClient, baked: Baked, **fields: Any) -> dict[str, Any]:
 
 
 def body(baked: Baked, **fields: Any) -> dict[str, Any]:
-    return {"bake": baked.bake, "view": "front", "look": {"lights": {"Key": LAMP}}, **fields}
+    return {"bake": baked.bake, "view": "front", "look": {"lights": {"Key": KEY_LIGHT}}, **fields}
 
 
 def encoded(data: bytes) -> str:
@@ -42,7 +42,7 @@ def test_a_stroke_changes_the_light_that_it_marks(client: TestClient, baked: Bak
 
 def test_a_reference_picture_is_matched(client: TestClient, baked: Baked) -> None:
     picture = png_bytes(np.full((48, 80, 3), 100, np.uint8))
-    look = {"lights": {"Key": LAMP}, "display": {"tone_map": "none"}}
+    look = {"lights": {"Key": KEY_LIGHT}, "display": {"tone_map": "none"}}
     answer = solve(client, baked, look=look, reference={"image": encoded(picture)})
     assert answer["look"]["lights"]["Key"]["intensity"] == pytest.approx(0.0, abs=1e-3)
     assert answer["look"]["environment"]["intensity"] == pytest.approx(0.1274, rel=0.02)
@@ -78,14 +78,14 @@ def test_unreached_strokes_are_named(client: TestClient, baked: Baked) -> None:
 def test_without_a_target_nothing_changes(client: TestClient, baked: Baked) -> None:
     answer = solve(client, baked)
     assert (answer["patch"], answer["changes"], answer["shortfalls"]) == ([], [], [])
-    assert answer["look"] == {"lights": {"Key": LAMP}}
+    assert answer["look"] == {"lights": {"Key": KEY_LIGHT}}
 
 
 @pytest.mark.parametrize(
     "fields",
     [
         {"view": "behind"},
-        {"look": {"lights": {"Key": {"kind": "lamp"}}}},
+        {"look": {"lights": {"Key": {"kind": "torch"}}}},
         {"locked": ["/lights/Zenith"]},
         {"camera": {"to_world": np.eye(4).ravel().tolist(), "yfov": 40.0}},
         {"size": [10, 10]},

@@ -103,6 +103,6 @@ def _body(request: SolveRequest, look: looks.Look, solved: LookMatch) -> SolveBo
         residual_before=match.residual_before,
         changes=[SourceChange(pointer=pointer, stops=stops) for pointer, stops in match.stops.items()],
         shortfalls=[
-            ShortfallBody.from_object(each, stroke=each.part if has_strokes else None) for each in match.shortfalls
+            ShortfallBody.from_object(each, stroke=each.region if has_strokes else None) for each in match.shortfalls
         ],
     )
