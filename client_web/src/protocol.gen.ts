@@ -285,7 +285,7 @@ export interface SharedPaths {
   bounces: number;
 }
 
-/** Find the lights of a look from its image. `look`: a look document, may be partial. `camera` and `size`: of a bake with a free camera, by default the view's. Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all strokes are `brighter` or `darker`. */
+/** Find the lights of a look from its image. `look`: a look document, may be partial. `camera` and `size`: of a bake with a free camera, by default the view's. Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all strokes are `brighter` or `darker`. `rotate`: the environment may rotate, which renders it about 25 times. */
 export interface SolveRequest {
   bake: string;
   view: string;
@@ -296,6 +296,7 @@ export interface SolveRequest {
   reference?: ReferenceBody | null;
   locked?: string[];
   change?: "intensity" | "color" | null;
+  rotate?: boolean;
 }
 
 /** A stroke of a brush over the image: `brighter` or `darker` by `stops`; in a `color` (linear Rec. 709) at equal luminance; or as the `reference` picture there. `points`: a line in pixels, from the left and from the top of the image, with a brush of `radius` pixels. `mask`: instead, a gray PNG of the image in base64, white where the stroke is. */

@@ -28,13 +28,15 @@ class Match:
     Attributes:
         changes: changed fields by the JSON pointers of their sources. stops: change of their luminance; None from or to
             black. residual: relative RMS error of the marked
-            pixels; `residual_before`: that of the current look. shortfalls: regions that are not reached.
+            pixels; `residual_before`: that of the current look. error: the same of all pixels
+            with weight, also those that are to stay. shortfalls: regions that are not reached.
     """
 
     changes: dict[str, dict[str, Any]]
     stops: dict[str, float | None]
     residual: float
     residual_before: float
+    error: float
     shortfalls: tuple[Shortfall, ...]
 
 
@@ -59,13 +61,14 @@ def match_lights(
     is_free = np.array([pointer not in locked for pointer in sources.pointers])
     equations = NormalEquations.from_target(sources, painted.target)
     strengths = solve_strengths(sources, equations, is_free, changes_color=changes_color, ridge=ridge)
-    radiance, marked = painted.target.radiance, painted.marked
+    image, radiance, marked = sources.image(strengths), painted.target.radiance, painted.marked
     changes = strength_changes(sources, strengths, changes_color=changes_color)
     return Match(
         changes,
         {pointer: _stops(sources, strengths, pointer) for pointer in changes},
-        residual(sources.image(strengths), radiance, marked),
+        residual(image, radiance, marked),
         residual(sources.image(sources.strengths), radiance, marked),
+        residual(image, radiance, painted.target.weights),
         tuple(shortfalls(sources, strengths, is_free, radiance, painted.regions)),
     )
 

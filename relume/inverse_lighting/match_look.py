@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ import numpy as np
 from relume.inverse_lighting.match_lights import Match, match_lights
 from relume.inverse_lighting.painting import PaintedTarget, Stroke, painted_target
 from relume.inverse_lighting.reference_picture import match_exposure, read_reference
+from relume.inverse_lighting.rotation import best_rotation
 from relume.inverse_lighting.solve import RIDGE
-from relume.inverse_lighting.sources import RenderLook, load_sources, replace_operations
+from relume.inverse_lighting.sources import ENVIRONMENT_POINTER, RenderLook, load_sources, replace_operations
 from relume.look import Look
 
 REFERENCE_RIDGE = 1e-6
@@ -29,6 +31,7 @@ class MatchRequest:
         strokes: makes the strokes for an image of a width and a height. reference: contents of a picture's file.
         fits_exposure: the reference picture is scaled to the image's mean luminance.
         locked: JSON pointers of lights that stay. changes_color: colors of lights may change.
+        rotates: the environment may rotate, unless it is locked.
     """
 
     strokes: MakeStrokes = lambda size: ()
@@ -36,6 +39,7 @@ class MatchRequest:
     fits_exposure: bool = False
     locked: frozenset[str] = frozenset()
     changes_color: bool = True
+    rotates: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,32 @@ def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMat
         ParameterError: the request does not fit the look.
     """
     sources = load_sources(look, render)
-    image = sources.image(sources.strengths)
-    painted = _painted(look, image, request)
+    painted = _painted(look, sources.image(sources.strengths), request)
     ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
-    match = match_lights(sources, painted, request.locked, changes_color=request.changes_color, ridge=ridge)
-    return LookMatch(replace_operations(match.changes), match)
+
+    @cache
+    def match_at(rotation: float) -> Match:
+        return match_lights(
+            load_sources(_rotated(look, rotation), render),
+            painted,
+            request.locked,
+            changes_color=request.changes_color,
+            ridge=ridge,
+        )
+
+    current = look.environment.rotation
+    if not request.rotates or ENVIRONMENT_POINTER in request.locked or not painted.marked.any():
+        match = match_at(current)
+        return LookMatch(replace_operations(match.changes), match)
+    rotation = best_rotation(lambda degrees: match_at(degrees).error, current)
+    match = match_at(rotation)
+    rotated = [] if rotation == current % 360 else [{ENVIRONMENT_POINTER: {"rotation": rotation}}]
+    return LookMatch([op for changes in (*rotated, match.changes) for op in replace_operations(changes)], match)
+
+
+def _rotated(look: Look, rotation: float) -> Look:
+    environment = look.environment.model_copy(update={"rotation": rotation})
+    return look.model_copy(update={"environment": environment})
 
 
 def _painted(look: Look, image: Any, request: MatchRequest) -> PaintedTarget:

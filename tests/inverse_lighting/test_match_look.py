@@ -175,3 +175,12 @@ def test_shadow_catchers_are_refused(gathered, render):
     floor = look.materials["Floor"].model_copy(update={"shadow_catcher": True})
     with pytest.raises(EditError, match="shadow catcher"):
         load_sources(look.model_copy(update={"materials": {**look.materials, "Floor": floor}}), render)
+
+
+def test_the_rotation_of_the_environment_comes_back(gathered, render, tmp_path):
+    look, wanted = look_of(gathered), look_of(gathered, environment={"rotation": 130.0, "intensity": 0.5})
+    data = exr_bytes(render(wanted), tmp_path)
+    result = match_look(look, render, MatchRequest(reference=data, rotates=True))
+    assert matched(look, result).environment.rotation == pytest.approx(130.0, abs=2.0)
+    locked = match_look(look, render, MatchRequest(reference=data, rotates=True, locked=frozenset(["/environment"])))
+    assert matched(look, locked).environment == look.environment

@@ -54,6 +54,7 @@ def _solve(request: SolveRequest, transfer: OpenBake, library: Library) -> Solve
             fits_exposure=reference is not None and reference.fit_exposure,
             locked=frozenset(request.locked),
             changes_color=_changes_color(request),
+            rotates=request.rotate,
         ),
     )
     return _body(request, look, match)

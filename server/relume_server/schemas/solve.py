@@ -53,7 +53,7 @@ class SolveRequest(Body):
     `look`: a look document, may be partial. `camera` and `size`: of a bake with a free camera, by default the view's.
     Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as
     `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all
-    strokes are `brighter` or `darker`.
+    strokes are `brighter` or `darker`. `rotate`: the environment may rotate, which renders it about 25 times.
     """
 
     bake: Id
@@ -65,6 +65,7 @@ class SolveRequest(Body):
     reference: ReferenceBody | None = None
     locked: Annotated[list[Pointer], Field(default_factory=list, max_length=MAX_LOCKED)]
     change: Literal["intensity", "color"] | None = None
+    rotate: bool = False
 
 
 class SourceChange(Body):

@@ -14,6 +14,7 @@ import {
   matchPicture,
   matchStatus,
   referencePicture,
+  rotatesEnvironment,
   setReference,
   strokeColor,
   strokeKind,
@@ -85,6 +86,14 @@ function Reference() {
               onChange={(event) => (changesColor.value = event.currentTarget.checked)}
             />
             Colors
+          </label>
+          <label title="Also search the rotation of the environment; takes seconds">
+            <input
+              type="checkbox"
+              checked={rotatesEnvironment.value}
+              onChange={(event) => (rotatesEnvironment.value = event.currentTarget.checked)}
+            />
+            Rotate environment
           </label>
         </>
       )}

@@ -28,6 +28,8 @@ export const lockedPointers = signal<ReadonlySet<string>>(new Set());
 export const referencePicture = signal<{ name: string; image: string } | null>(null);
 /** True if only the relative brightness of the reference picture counts. */
 export const fitsExposure = signal(false);
+/** True if the environment may rotate when the whole picture is matched. */
+export const rotatesEnvironment = signal(false);
 export const matchStatus = signal("");
 
 const MAX_POINTS = 2000;
@@ -144,7 +146,8 @@ function sendGesture(current: Gesture): void {
         ];
   const needsPicture = strokes.length === 0 || kind === "reference";
   const change = kind === "color" || (needsPicture && changesColor.peek()) ? "color" : "intensity";
-  const body = { ...base, strokes, change, ...(needsPicture ? referenceBody() : {}) } satisfies SolveRequest;
+  const rotate = strokes.length === 0 && rotatesEnvironment.peek();
+  const body = { ...base, strokes, change, rotate, ...(needsPicture ? referenceBody() : {}) } satisfies SolveRequest;
   matchStatus.value = matchStatus.peek() === PREPARING ? PREPARING : matchStatus.peek() || SOLVING;
   requests.send({ body, gesture: current, numPoints: current.points.length });
 }
