@@ -57,10 +57,11 @@ def test_escape_cancels_the_stroke_and_then_closes_the_tool(editor: Editor) -> N
 
 
 def test_a_locked_environment_stays_and_the_bar_says_that_the_stroke_cannot_be_reached(editor: Editor) -> None:
+    before = editor.pixels()
     open_match(editor)
     bar = editor.page.get_by_role("group", name="Match lights")
     bar.get_by_role("button", name="Lock environment").click()
-    before = editor.pixels()
     paint(editor)
     expect(bar.get_by_role("status")).to_contain_text("the lights there are locked")
+    editor.page.keyboard.press("u")
     assert changed(before, editor.pixels()) == 0

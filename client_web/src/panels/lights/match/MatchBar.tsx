@@ -44,7 +44,7 @@ function Reference() {
   return (
     <>
       <button
-        class={`drop ${isOver ? "over" : ""}`}
+        class={`reference-drop ${isOver ? "over" : ""}`}
         title="PNG, JPEG, WebP, HDR or EXR"
         onClick={() => input.current?.click()}
         onDragOver={(event) => (event.preventDefault(), event.stopPropagation(), setOver(true))}
