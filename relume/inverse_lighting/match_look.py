@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -63,7 +62,6 @@ def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMat
     painted = _painted(look, sources.image(sources.strengths), request)
     ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
 
-    @cache
     def match_at(rotation: float) -> Match:
         return match_lights(
             load_sources(_rotated(look, rotation), render),
