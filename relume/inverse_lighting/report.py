@@ -46,9 +46,12 @@ class Shortfall:
 def residual(
     image: Shaped[F32, "height width 3"], radiance: Shaped[F32, "height width 3"], weights: Shaped[F32, "height width"]
 ) -> float:
-    """Return the weighted RMS difference of an image and a target, relative to the target; 0 without weights.
+    """Return the weighted RMS difference of an image and a target, relative to the target.
 
-    Absolute if the target is black.
+    Args:
+        image: radiance. radiance: of the target. weights: of the pixels.
+    Returns:
+        0 without weights; the absolute difference if the target is black.
     """
     w = np.where(np.isfinite(radiance).all(axis=-1), weights, 0.0).astype(np.float64)[..., None]
     wanted = np.where(w > 0.0, radiance, 0.0)

@@ -130,6 +130,9 @@ def strength_changes(
 
     The largest component of a color stays. A black source keeps its color, which its strength does not determine.
     Changes without a visible effect are omitted.
+
+    Args:
+        sources: the sources. strengths: new ones. changes_color: whether colors change, too.
     """
     changes: dict[str, dict[str, Any]] = {}
     rms = np.sqrt(sources.mean_squares).T
