@@ -41,6 +41,7 @@ def find_document(name: str) -> str:
                 "sharp.static",
                 "sharp.moving",
                 "lights.rmse",
+                "solve.error",
                 "free_camera.rmse",
                 "free_camera.blots",
                 "free_camera.all_rmse",

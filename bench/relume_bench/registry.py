@@ -294,6 +294,7 @@ GROUPS = (
             "lights.intensity_fps",
         ),
     ),
+    Group("relume_bench.solve", ("solve.error", "solve.error_noisy", "solve.ms")),
     Group(
         "relume_bench.memory",
         (

@@ -219,6 +219,12 @@ export interface PresenceMessage {
   material?: string | null;
 }
 
+/** A reference picture: `image`, the file in base64. PNG, JPEG and WebP have display values, from which exposure and tone mapping of the look are removed; HDR and OpenEXR have linear radiance. `fit_exposure`: only its relative brightness counts. */
+export interface ReferenceBody {
+  image: string;
+  fit_exposure?: boolean;
+}
+
 /** client → server: visible region of a view with a "fixed" camera: x, y, width, height in pixels of its image. It is computed first, approximate frames contain only its tiles, and `fidelity` refers to it. null: the whole image, the default. */
 export interface RegionMessage {
   type: "region";
@@ -277,6 +283,30 @@ export interface ShareRequest {
 export interface SharedPaths {
   show: "all" | "direct" | "indirect" | "first_bounce" | "further_bounces";
   bounces: number;
+}
+
+/** Find the lights of a look from its image. `look`: a look document, may be partial. `camera` and `size`: of a bake with a free camera, by default the view's. Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all strokes are `brighter` or `darker`. `rotate`: the environment may rotate, which renders it about 25 times. */
+export interface SolveRequest {
+  bake: string;
+  view: string;
+  look?: Record<string, unknown>;
+  camera?: CameraFrame | null;
+  size?: [number, number] | null;
+  strokes?: StrokeBody[];
+  reference?: ReferenceBody | null;
+  locked?: string[];
+  change?: "intensity" | "color" | null;
+  rotate?: boolean;
+}
+
+/** A stroke of a brush over the image: `brighter` or `darker` by `stops`; in a `color` (linear Rec. 709) at equal luminance; or as the `reference` picture there. `points`: a line in pixels, from the left and from the top of the image, with a brush of `radius` pixels. `mask`: instead, a gray PNG of the image in base64, white where the stroke is. */
+export interface StrokeBody {
+  kind: "brighter" | "darker" | "color" | "reference";
+  points?: [number, number][];
+  radius?: number;
+  mask?: string | null;
+  stops?: number;
+  color?: [number, number, number];
 }
 
 /** A synthetic BTF to render from a small geometry, `size` texels wide. */
@@ -1031,6 +1061,31 @@ export interface SharedOperation {
   op: "replace" | "add" | "remove";
   path: string;
   value: unknown;
+}
+
+/** A part of the target that cannot be reached. `stroke`: its index, null for a whole reference picture. `cause`: all lights that reach it are `locked`; `no_light` reaches it; or lights that do, reach other pixels, too (`conflict`). `asked_stops`, `reached_stops`: change of its mean luminance, null from or to black. */
+export interface ShortfallBody {
+  stroke: number | null;
+  residual: number;
+  cause: "locked" | "no_light" | "conflict";
+  asked_stops: number | null;
+  reached_stops: number | null;
+}
+
+/** The solution. `patch`: JSON Patch on the complete look; `look`: the look of the request with these changes. `residual`, `residual_before`: relative RMS error of the marked pixels; 0 if none are marked. */
+export interface SolveBody {
+  patch: PatchOperation[];
+  look: Record<string, unknown>;
+  residual: number;
+  residual_before: number;
+  changes: SourceChange[];
+  shortfalls: ShortfallBody[];
+}
+
+/** Change of a light. `pointer`: JSON pointer of the light in the look. `stops`: of its luminance; null from or to black. */
+export interface SourceChange {
+  pointer: string;
+  stops: number | null;
 }
 
 /** server → client: something takes time; `progress` 0…1. A curve is precomputed for edits (`label` names it), or a term is shaded for the first time; "ready" ends it. Other work continues meanwhile. */

@@ -30,7 +30,7 @@ _PIXELS_PER_RANGE = 1 << 15
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 _MAX_RADIANCE = np.float32(1e9)  # far above white in every tone curve; avoids inf/inf
-_INSET = np.array(
+AGX_INSET = np.array(
     [
         [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
         [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
@@ -38,7 +38,7 @@ _INSET = np.array(
     ],
     np.float32,
 )
-_OUTSET = np.array(
+AGX_OUTSET = np.array(
     [
         [1.19687900512017, -0.0980208811401368, -0.0990297440797205],
         [-0.0528968517574562, 1.15190312990417, -0.0989611768448433],
@@ -46,13 +46,13 @@ _OUTSET = np.array(
     ],
     np.float32,
 )
-_AGX_MIN_EV, _AGX_RANGE_EV = np.float32(-12.47393), np.float32(4.026069 + 12.47393)
-_MIN_RADIANCE = np.float32(1e-10)  # has a logarithm, and lies below _AGX_MIN_EV
+AGX_MIN_EV, AGX_RANGE_EV = np.float32(-12.47393), np.float32(4.026069 + 12.47393)
+_MIN_RADIANCE = np.float32(1e-10)  # has a logarithm, and lies below AGX_MIN_EV
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _agx_curve(v):  # type: ignore[no-untyped-def]
-    x = min(max((math.log2(max(v, _MIN_RADIANCE)) - _AGX_MIN_EV) / _AGX_RANGE_EV, _ZERO), _ONE)
+def agx_curve(v):  # type: ignore[no-untyped-def]
+    x = min(max((math.log2(max(v, _MIN_RADIANCE)) - AGX_MIN_EV) / AGX_RANGE_EV, _ZERO), _ONE)
     p = np.float32(15.5) * x - np.float32(40.14)
     p = p * x + np.float32(31.96)
     p = p * x - np.float32(6.868)
@@ -84,10 +84,10 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
             rgb[c] = min(v, _MAX_RADIANCE) if v > _ZERO else _ZERO  # NaN is not above zero
         if kind == _AGX:
             for c in range(3):
-                out[k, c] = _agx_curve(_INSET[c, 0] * rgb[0] + _INSET[c, 1] * rgb[1] + _INSET[c, 2] * rgb[2])
+                out[k, c] = agx_curve(AGX_INSET[c, 0] * rgb[0] + AGX_INSET[c, 1] * rgb[1] + AGX_INSET[c, 2] * rgb[2])
             rgb[:] = out[k]
             for c in range(3):
-                v = _OUTSET[c, 0] * rgb[0] + _OUTSET[c, 1] * rgb[1] + _OUTSET[c, 2] * rgb[2]
+                v = AGX_OUTSET[c, 0] * rgb[0] + AGX_OUTSET[c, 1] * rgb[1] + AGX_OUTSET[c, 2] * rgb[2]
                 out[k, c] = min(max(v, _ZERO), _ONE)
         else:
             for c in range(3):

@@ -82,21 +82,27 @@ def _pixels(picture: Picture | FreeCameraPicture, for_display: bool) -> NDArray[
 
 
 def render_small(
-    transfer: OpenBake, view_name: str, look: Look, width: int
+    transfer: OpenBake,
+    view_name: str,
+    look: Look,
+    width: int,
+    camera_and_size: tuple[Camera, tuple[int, int]] | None = None,
 ) -> Shaped[NDArray[np.float32], "h w channels"]:
     """Render a look with only as many pixels as a small image needs, a whole fraction of the baked ones.
 
     Args:
         transfer: an opened bake. view_name: one of its views. look: the look.
-        width: width of the small image.
+        width: width of the small image. camera_and_size: as for `render_image`; the size of the large image.
     Returns:
         Linear radiance, at least `width` wide if the bake is.
     """
     view = transfer.views[view_name]
-    step = max(1, view.width // width)
     if isinstance(transfer, BakedFreeCamera):
-        small_size = view.width // step, max(1, view.height // step)
-        return _render_free_camera(transfer, view_name, look, (view.camera, small_size)).image()
+        camera, (large_width, height) = camera_and_size or (view.camera, (view.width, view.height))
+        step = max(1, large_width // width)
+        small_size = large_width // step, max(1, height // step)
+        return _render_free_camera(transfer, view_name, look, (camera, small_size)).image()
+    step = max(1, view.width // width)
     return render_image(
         transfer if step < 2 else cast("FixedViewTransfer", transfer).downsampled(view_name, step), view_name, look
     )

@@ -32,6 +32,7 @@ from relume_server.api import (
     scenes,
     session,
     shares,
+    solve,
     viewport,
 )
 from relume_server.api.assets import balls, btf_jobs, btfs, environments, images, imported, library, materials
@@ -81,6 +82,7 @@ ROUTE_GROUPS = (
     comparisons,
     looks,
     shares,
+    solve,
     session,
     login,
     health,

@@ -41,6 +41,7 @@ from relume_server.schemas import (
     protocol,
     renders,
     rooms,
+    solve,
 )
 from relume_server.ts_syntax import interface, literal, union
 
@@ -93,6 +94,7 @@ INPUTS: tuple[type[BaseModel], ...] = (
     comments.CommentRequest,
     comments.CommentChange,
     btfs.SyntheticBtfRequest,
+    solve.SolveRequest,
 )
 OUTPUTS: tuple[type[BaseModel], ...] = (
     protocol.Problem,
@@ -131,6 +133,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.ShareEntry,
     bodies.ShareBody,
     comments.CommentBody,
+    solve.SolveBody,
 )
 
 

@@ -150,6 +150,7 @@ BOUNDED = {
     "core/source_hash.py",
     "export/export_materials.py",
     "export/surface_values.py",
+    "image_io/inverse_tone_mapping.py",
     "image_io/ocio/config.py",
     "images/image_store.py",
     "live/fixed_camera/illumination.py",

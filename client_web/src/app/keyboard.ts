@@ -1,5 +1,6 @@
 /** Keyboard shortcuts of the page; a focused control handles its own keys first. */
 import { useEffect } from "preact/hooks";
+import { cancelMatch } from "../panels/lights/match/match";
 import { stopPlacement } from "../panels/lights/placement";
 import { helpOpen } from "../state/panels";
 import { formatShortcut } from "../ui/chord";
@@ -28,6 +29,7 @@ function onKeyDown(event: KeyboardEvent): void {
   if (event.key === "Escape") {
     helpOpen.value = false;
     stopPlacement();
+    cancelMatch();
   }
   const action = shortcutOf(event);
   if (action === undefined || (isTyping(event.target) && !event.ctrlKey && !event.metaKey)) return;

@@ -4,6 +4,7 @@ import { logarithmic, curveTool } from "../curve/curveView";
 import { editValue } from "../edit/edit";
 import { storeA, saveLook, swapWithA, toggleWipe } from "../panels/looks/abCompare";
 import { exportPng } from "../panels/looks/exportImage";
+import { toggleMatch } from "../panels/lights/match/match";
 import { redo, undo } from "../panels/looks/undoRedo";
 import { zoomActual, zoomBy, zoomFit } from "../render/zoom";
 import { toggleSolo } from "../state/visibility/soloSources";
@@ -60,6 +61,7 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Light handles", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
   { group: "Picture", label: "Exposure −⅓ stop", keys: [","], run: () => changeExposure(-THIRD_STOP) },
   { group: "Picture", label: "Exposure +⅓ stop", keys: ["."], run: () => changeExposure(THIRD_STOP) },
+  { group: "Picture", label: "Match lights", keys: ["u"], run: toggleMatch },
   { group: "Camera", label: "Walk or orbit", keys: ["o"], run: () => withFreeCamera(toggleNavigation) },
   { group: "Camera", label: "Go inside a room", keys: ["i"], run: () => withFreeCamera((camera) => camera.goInside()) },
   {

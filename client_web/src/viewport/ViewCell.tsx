@@ -9,6 +9,8 @@ import { CommentPins } from "../panels/collaboration/CommentPins";
 import { acceptImageDrops } from "../panels/inspector/images/dropImages";
 import { acceptMaterialDrops } from "../panels/library/dropMaterial";
 import { LightHandles } from "../panels/lights/LightHandles";
+import { MatchBrush } from "../panels/lights/match/MatchBrush";
+import { isMatchOpen } from "../panels/lights/match/match";
 import { requestPixelProbe } from "../session/pixelProbe";
 import { pickMaterial } from "../render/materialPicking";
 import { ImageCanvas } from "../render/canvas";
@@ -189,6 +191,7 @@ export function ViewCell({ view }: { view: string }) {
       )}
       {screen !== null && <LightHandles screen={screen} />}
       {screen !== null && <CommentPins screen={screen} />}
+      {isMatchOpen.value && screen !== null && <MatchBrush screen={screen} />}
       {wipe.value.isOn && screen !== null && <WipeHandle screen={screen} />}
       <BusyOverlay image={stage.imageOf(view)} />
       {isGrid && <ViewName view={view} />}

@@ -1,6 +1,7 @@
 /** The image of one view, or of several side by side, with labels. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { CameraBar } from "./cameras/CameraBar";
+import { MatchBar } from "../panels/lights/match/MatchBar";
 import { PlacementBar } from "../panels/lights/PlacementBar";
 import { shownViews, activeView } from "../state/views";
 import { Toasts } from "../ui/toasts";
@@ -43,6 +44,7 @@ export function Viewport() {
             <ViewCell key={index} view={name} />
           ))}
         </div>
+        <MatchBar />
         <PlacementBar />
         <FilterBadge />
         <HistogramView />

@@ -1,4 +1,5 @@
 /** Bar under the image: pixel probe on the left, view controls on the right. */
+import { isMatchOpen, toggleMatch } from "../panels/lights/match/match";
 import { toDisplay } from "../render/color/tonemap";
 import { stage } from "../render/renderStage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";
@@ -52,6 +53,9 @@ export function ViewportBar() {
         onClick={() => togglePanel("comments")}
       >
         Comments{openComments.value.length > 0 && <span class="count">{openComments.value.length}</span>}
+      </button>
+      <button aria-pressed={isMatchOpen.value} title="Paint light, and the lights are found (U)" onClick={toggleMatch}>
+        Match
       </button>
       <button
         aria-pressed={histogramOpen.value}

@@ -102,6 +102,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/looks/{name}/thumbnail": {"PUT": EDIT},
     "/api/looks/{name}/thumbnail.webp": {"GET": VIEW},
     "/api/shares/{share}": {"GET": VIEW, "DELETE": EDIT},
+    "/api/solve": {"POST": VIEW},
 }
 
 MESSAGES: Mapping[str, Role] = {

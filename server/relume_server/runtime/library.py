@@ -22,6 +22,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     # Imported here because they load compiled kernels, which a process that only describes the API does not need.
     from relume.core.cache import Cache, use_for_assets
     from relume.core.source_hash import image_code
+    from relume.inverse_lighting.sources import image_key
     from relume.live.fixed_camera.picture import Picture
     from relume.live.fixed_camera.protocols import CameraMode
     from relume.live.free_camera.browser.geometry_arrays import array_factories, constants
@@ -74,6 +75,20 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         static_views = static_view_builder(transfer) if is_traced else None
         return render_image(transfer, view, look, static_views=static_views, **options)
 
+    def small_renderer(transfer: Any, view: str, width: int, camera_and_size: Any) -> Any:
+        camera_key = None if camera_and_size is None else _camera_key(*camera_and_size)
+
+        def render_cached(look: Any) -> Any:
+            key = transfer.key, "light images", view, width, camera_key, image_key(look)
+            return transfer.cache.transient.get_value(
+                key, lambda: render_small(transfer, view, look, width, camera_and_size)
+            )
+
+        return render_cached
+
+    def _camera_key(camera: Camera, size: tuple[int, int]) -> tuple[Any, ...]:
+        return camera.to_world.tobytes(), camera.yfov, camera.near, size
+
     image_code()  # of the running version: its files may be replaced meanwhile
     memory = Cache(cache_bytes)
     use_for_assets(memory)
@@ -84,6 +99,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         render=render,
         aov_tracer=aov_tracer,
         render_small=render_small,
+        small_renderer=small_renderer,
         reference=reference,
         open_viewport=open_viewport,
         shader_arrays=lambda transfer: (constants(transfer), array_factories(transfer)),

@@ -93,7 +93,9 @@ class Library:
             if the look's background is transparent; `progress`, `is_canceled`, `for_display` and `camera_and_size` as
             for `render_image`; `exact`: for a free camera, instead of the approximate image; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
-            columns if the bake has them.
+            columns if the bake has them; `camera_and_size` as for `render`.
+        small_renderer: (transfer, view name, width, camera and size or None) -> the same as a function of the look,
+            which keeps its images in the cache.
         reference: (folder of a scene, camera, complete look, size, spp, progress, canceled, pass index, reflects=has
             indirect light, is_whole=all light paths requested) -> `relume.reference.ReferenceImage`; heavy.
         aov_tracer: (transfer, complete look) -> `relume.output.exr.aovs.AovTracer`; heavy.
@@ -109,6 +111,7 @@ class Library:
     make_picture: Callable[[Any, str], Picture]
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
+    small_renderer: Callable[[Any, str, int, Any], Callable[[Any], F32]]
     reference: Callable[..., ReferenceImage]
     aov_tracer: Callable[[Any, Any], AovTracer]
     open_viewport: Callable[[Path], PlacementViewport]

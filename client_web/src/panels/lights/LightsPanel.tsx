@@ -14,6 +14,8 @@ import { Slider } from "../../ui/Slider";
 import { ToggleButton } from "../../ui/ToggleButton";
 import { LIGHT_KINDS, labelOf } from "./lightKinds";
 import { editLight, lightPath, lights } from "./lightEdits";
+import { MatchLock } from "./match/MatchLock";
+import { isMatchOpen } from "./match/match";
 import { isAddMenuOpen, placingKind, startPlacement, stopPlacement } from "./placement";
 
 const TITLE = "Lights";
@@ -25,7 +27,10 @@ function LightRow({ name, light }: { name: string; light: Light }) {
     if (selected) row.current?.scrollIntoView({ block: "nearest" }); // a new light may be out of view
   }, [selected]);
   return (
-    <li ref={row} class={`light ${selected ? "selected" : ""} ${light.enabled ? "" : "off"}`}>
+    <li
+      ref={row}
+      class={`light ${selected ? "selected" : ""} ${light.enabled ? "" : "off"} ${isMatchOpen.value ? "lockable" : ""}`}
+    >
       <IconButton
         icon="light"
         label={`Turn ${light.enabled ? "off" : "on"} ${name}`}
@@ -53,6 +58,7 @@ function LightRow({ name, light }: { name: string; light: Light }) {
         pressed={soloLight.value === name}
         onClick={() => toggleLightSolo(name)}
       />
+      {isMatchOpen.value && <MatchLock label={name} pointer={lightPath(name)} />}
       <Slider
         label={`${name}: intensity`}
         value={light.intensity}

@@ -30,6 +30,8 @@ import type {
   ShareBody,
   ShareEntry,
   ShareRequest,
+  SolveBody,
+  SolveRequest,
   SyntheticBtfRequest,
   Term,
   ComparisonBody,
@@ -245,6 +247,11 @@ export async function createShare(body: ShareRequest): Promise<ShareEntry> {
   return (await (await request("/api/shares", json("POST", body))).json()) as ShareEntry;
 }
 export const getShare = (id: string) => getJson<ShareBody>(`/api/shares/${encodeURIComponent(id)}`);
+
+/** Lights from strokes over an image, or from a reference picture. */
+export async function solveLook(body: SolveRequest): Promise<SolveBody> {
+  return (await (await request("/api/solve", json("POST", body))).json()) as SolveBody;
+}
 
 export type ComparisonImage = "error" | "reference" | "method-error" | "method-reference";
 

@@ -1,0 +1,98 @@
+"""Match a look to strokes over its image, to a reference picture, or to both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from relume.inverse_lighting.match_lights import Match, match_lights
+from relume.inverse_lighting.painting import PaintedTarget, Stroke, painted_target
+from relume.inverse_lighting.reference_picture import match_exposure, read_reference
+from relume.inverse_lighting.rotation import best_rotation
+from relume.inverse_lighting.solve import RIDGE
+from relume.inverse_lighting.sources import ENVIRONMENT_POINTER, RenderLook, load_sources, replace_operations
+from relume.look import Look
+
+REFERENCE_RIDGE = 1e-6
+"""λ for a picture: its pixels tell apart what a stroke leaves open."""
+Size = tuple[int, int]
+MakeStrokes = Callable[[Size], Sequence[Stroke]]
+
+
+@dataclass(frozen=True)
+class MatchRequest:
+    """A target, and the fields of a look that may change.
+
+    Attributes:
+        strokes: makes the strokes for an image of a width and a height. reference: contents of a picture's file.
+        fits_exposure: the reference picture is scaled to the image's mean luminance.
+        locked: JSON pointers of lights that stay. changes_color: colors of lights may change.
+        rotates: the environment may rotate, unless it is locked.
+    """
+
+    strokes: MakeStrokes = lambda size: ()
+    reference: bytes | None = None
+    fits_exposure: bool = False
+    locked: frozenset[str] = frozenset()
+    changes_color: bool = True
+    rotates: bool = False
+
+
+@dataclass(frozen=True)
+class LookMatch:
+    """A matched look: the operations of a JSON Patch on a complete look, and the report."""
+
+    operations: list[dict[str, Any]]
+    match: Match
+
+
+def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMatch:
+    """Find the lights of a look with which its image is nearest to a target.
+
+    Args:
+        look: the current look. render: renders small images of looks; all have the same size. request: the target.
+    Raises:
+        EditError: the look's image is not linear in its lights. SceneError: the reference picture cannot be read.
+        ParameterError: the request does not fit the look.
+    """
+    sources = load_sources(look, render)
+    painted = _painted(look, sources.image(sources.strengths), request)
+    ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
+
+    def match_at(rotation: float) -> Match:
+        return match_lights(
+            load_sources(_rotated(look, rotation), render),
+            painted,
+            request.locked,
+            changes_color=request.changes_color,
+            ridge=ridge,
+        )
+
+    current = look.environment.rotation
+    if not request.rotates or ENVIRONMENT_POINTER in request.locked or not painted.marked.any():
+        match = match_at(current)
+        return LookMatch(replace_operations(match.changes), match)
+    rotation = best_rotation(lambda degrees: match_at(degrees).error, current)
+    match = match_at(rotation)
+    rotated = [] if rotation == current % 360 else [{ENVIRONMENT_POINTER: {"rotation": rotation}}]
+    return LookMatch([op for changes in (*rotated, match.changes) for op in replace_operations(changes)], match)
+
+
+def _rotated(look: Look, rotation: float) -> Look:
+    environment = look.environment.model_copy(update={"rotation": rotation})
+    return look.model_copy(update={"environment": environment})
+
+
+def _painted(look: Look, image: Any, request: MatchRequest) -> PaintedTarget:
+    size = image.shape[1], image.shape[0]
+    strokes, reference = request.strokes(size), None
+    if request.reference is not None:
+        reference = read_reference(request.reference, look.display, size)
+        if request.fits_exposure:
+            marks = [stroke.mask for stroke in strokes if stroke.kind == "reference"]
+            weights = np.max(marks, axis=0) if marks else np.ones(image.shape[:2], np.float32)
+            reference = match_exposure(reference, image, weights)
+    return painted_target(strokes, image, reference)

@@ -1,0 +1,142 @@
+"""Strengths of light sources by bounded least squares.
+
+For each channel c, minimize over the strengths x of the free sources
+
+    Σ_p w_p (Σ_s A_spc x_sc + b_pc − t_pc)² + λ W Σ_s n_sc² (x_sc − x⁰_sc)²,   0 ≤ x ≤ x_max,
+
+with the images A of the sources, the constant b, the target t, the weights w, W = Σ_p w_p, the mean square n² of each
+image and the current strengths x⁰. The ridge λ leaves sources where they are as far as the target does not decide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
+
+from relume.core.errors import ParameterError, ShapeMismatchError
+from relume.inverse_lighting.sources import Sources
+from relume.look.light_validation import MAX_INTENSITY
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+RIDGE = 1e-4
+_RELATIVE_ROUNDING = 1e-12
+MAX_RADIANCE = 1e9
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target image. weights: of the squared error of each pixel, at least 0. radiance: linear; a pixel that is not
+    finite has no weight, and a negative value is black."""
+
+    radiance: Shaped[F32, "height width 3"]
+    weights: Shaped[F32, "height width"]
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Normal equations of a target, one system per channel: gram G = AᵀWA, rhs g = AᵀW(t − b), ridge W n²."""
+
+    gram: Shaped[F64, "3 sources sources"]
+    rhs: Shaped[F64, "3 sources"]
+    ridge: Shaped[F64, "3 sources"]
+
+    @classmethod
+    def from_target(cls, sources: Sources, target: Target) -> NormalEquations:
+        """Sum them over the pixels of a target.
+
+        Raises:
+            ShapeMismatchError: the target has another size than the images. ParameterError: a weight is negative or
+                not finite.
+        """
+        radiance, weights = _checked(sources, target)
+        images = sources.images.reshape(*sources.images.shape[:2], -1)
+        weighted, wanted = images * weights.reshape(-1), (radiance - sources.constant).reshape(-1, 3)
+        return cls(
+            (weighted @ np.moveaxis(images, 1, 2)).astype(np.float64),
+            np.einsum("csp,pc->cs", weighted, wanted, dtype=np.float64),
+            float(weights.sum(dtype=np.float64)) * sources.mean_squares,
+        )
+
+
+def _checked(sources: Sources, target: Target) -> tuple[F32, F32]:
+    if target.radiance.shape != sources.constant.shape or target.weights.shape != sources.constant.shape[:2]:
+        raise ShapeMismatchError(
+            f"the target has the shape {target.radiance.shape}, its weights {target.weights.shape}, and the image "
+            f"{sources.constant.shape}; resize it"
+        )
+    if not (np.isfinite(target.weights).all() and (target.weights >= 0.0).all()):
+        raise ParameterError("weights", "weights below 0 or not finite", "numbers of at least 0")
+    is_valid = np.asarray(np.isfinite(target.radiance).all(axis=-1))
+    radiance = np.clip(np.where(is_valid[..., None], target.radiance, 0.0), 0.0, MAX_RADIANCE)
+    return radiance.astype(np.float32), np.where(is_valid, target.weights, 0.0).astype(np.float32)
+
+
+def solve_strengths(
+    sources: Sources,
+    equations: NormalEquations,
+    is_free: Shaped[NDArray[np.bool_], " sources"],
+    *,
+    changes_color: bool,
+    ridge: float = RIDGE,
+) -> Shaped[F64, "sources 3"]:
+    """Return the strengths that solve the normal equations.
+
+    Args:
+        sources: the sources. equations: of the target.
+        is_free: false for sources that stay. A source stays, too, where its image is black.
+        changes_color: whether channels change separately; otherwise intensities alone, with the current colors.
+        ridge: λ.
+    """
+    if changes_color:
+        return _solve_channels(sources, equations, is_free, ridge)
+    return _solve_intensities(sources, equations, is_free, ridge)
+
+
+def _solve_channels(
+    sources: Sources, equations: NormalEquations, is_free: NDArray[np.bool_], ridge: float
+) -> Shaped[F64, "sources 3"]:
+    limits = MAX_INTENSITY * sources.color_scales[:, 0]
+    columns = [
+        _solve_system(gram, rhs, ridge * scale, current, limits, is_free)
+        for gram, rhs, scale, current in zip(
+            equations.gram, equations.rhs, equations.ridge, sources.strengths.T, strict=True
+        )
+    ]
+    return np.stack(columns, axis=-1)
+
+
+def _solve_intensities(
+    sources: Sources, equations: NormalEquations, is_free: NDArray[np.bool_], ridge: float
+) -> Shaped[F64, "sources 3"]:
+    """Solve for the intensities, which joins the systems of the channels."""
+    colors = sources.colors
+    gram = np.einsum("sc,cst,tc->st", colors, equations.gram, colors)
+    rhs = np.einsum("sc,cs->s", colors, equations.rhs)
+    scale = np.einsum("sc,cs->s", np.square(colors), equations.ridge)
+    limits = np.full(len(colors), MAX_INTENSITY)
+    return _solve_system(gram, rhs, ridge * scale, sources.intensities, limits, is_free)[:, None] * colors
+
+
+def _solve_system(
+    gram: F64, rhs: F64, ridge: F64, current: F64, limits: F64, is_free: NDArray[np.bool_]
+) -> Shaped[F64, " sources"]:
+    """Minimize xᵀGx − 2gᵀx + Σ ridge (x − current)² over the free variables in [0, limit]."""
+    free = np.flatnonzero(is_free & (ridge > 0.0))
+    strengths = current.copy()
+    if not len(free) or not gram.any():
+        return strengths
+    fixed = np.setdiff1d(np.arange(len(current)), free)
+    system = gram[np.ix_(free, free)] + np.diag(ridge[free])
+    wanted = rhs[free] - gram[np.ix_(free, fixed)] @ current[fixed] + ridge[free] * current[free]
+    scale = 1.0 / np.sqrt(np.diag(system))  # Jacobi: sources may differ by many orders of magnitude
+    system *= scale[:, None] * scale
+    factor = cholesky(system + _RELATIVE_ROUNDING * np.eye(len(free)))
+    reduced = solve_triangular(factor, wanted * scale, trans="T")
+    strengths[free] = lsq_linear(factor, reduced, (0.0, limits[free] / scale), method="bvls").x * scale
+    return strengths

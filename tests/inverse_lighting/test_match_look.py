@@ -1,0 +1,186 @@
+"""Looks matched to pictures of a bake: the lights that made a picture come back."""
+
+from __future__ import annotations
+
+import io
+
+import jsonpatch
+import numpy as np
+import pytest
+from PIL import Image
+from session_edits import make_look
+
+from relume.core.errors import EditError, SceneError
+from relume.image_io.tone_mapping import tone_map
+from relume.image_io.write_image import png_bytes, to_bytes, write_image
+from relume.inverse_lighting.match_look import MatchRequest, match_look
+from relume.inverse_lighting.painting import Stroke
+from relume.inverse_lighting.reference_picture import read_reference
+from relume.inverse_lighting.sources import load_sources
+from relume.look import Look
+from relume.output.render_image import render_image
+
+LIGHTS = {
+    "Key/1": {"kind": "point", "position": [0.5, 1.3, 0.5], "emission": [2.0, 1.5, 1.0]},
+    "Fill": {
+        "kind": "rectangle", "position": [0.9, 1.2, 0.9], "direction": [-1, -1, -1], "size": [0.5, 0.3],
+        "emission": [1.0, 2.0, 4.0],
+    },
+    "Off": {"kind": "point", "position": [0.0, 1.0, 0.0], "enabled": False},
+}  # fmt: skip
+
+
+def look_of(transfer, *, background="map", tone="agx", **lights):
+    """A look with the lights; keywords change their fields by name, `environment` too."""
+
+    def change(document):
+        document["lights"].update(LIGHTS)
+        document["background"].update(kind=background, color=[0.2, 0.3, 0.1])
+        document["display"].update(exposure=0.5, tone_map=tone)
+        for name, fields in lights.items():
+            document["environment" if name == "environment" else "lights"].update(
+                fields if name == "environment" else {KEYS[name]: {**document["lights"][KEYS[name]], **fields}}
+            )
+
+    return make_look(transfer, change)
+
+
+KEYS = {"key": "Key/1", "fill": "Fill"}
+WANTED = {
+    "key": {"intensity": 3.0, "color": [1.0, 0.5, 0.25]},
+    "fill": {"intensity": 0.4},
+    "environment": {"intensity": 0.6, "color": [0.5, 0.75, 1.0]},
+}
+
+
+@pytest.fixture(scope="module")
+def render(gathered):
+    images = {}
+
+    def render(look):
+        key = look.model_dump_json(exclude={"display"})
+        if key not in images:
+            images[key] = render_image(gathered, "front", look)
+        return images[key]
+
+    return render
+
+
+def matched(look, result):
+    """The look after the operations of a match."""
+    return Look.model_validate(jsonpatch.apply_patch(look.model_dump(mode="json"), result.operations))
+
+
+def relative_error(image, reference):
+    return np.linalg.norm(image - reference) / np.linalg.norm(reference)
+
+
+def exr_bytes(image, folder):
+    write_image(folder / "a.exr", image)
+    return (folder / "a.exr").read_bytes()
+
+
+@pytest.mark.parametrize("background", ["map", "color"])
+def test_images_of_sources_sum_to_the_image(gathered, render, background):
+    look = look_of(gathered, background=background, **WANTED)
+    sources = load_sources(look, render)
+    assert sources.pointers == ("/environment", "/lights/Key~11", "/lights/Fill")
+    assert relative_error(sources.image(sources.strengths), render(look)) < 1e-4
+
+
+@pytest.mark.parametrize("background", ["map", "color"])
+def test_the_lights_of_a_picture_come_back(gathered, render, tmp_path, background):
+    look, wanted = look_of(gathered, background=background), look_of(gathered, background=background, **WANTED)
+    result = match_look(look, render, MatchRequest(reference=exr_bytes(render(wanted), tmp_path)))
+    after = matched(look, result)
+    assert relative_error(render(after), render(wanted)) < 0.01
+    assert result.match.residual < 0.01
+    assert after.lights["Key/1"].intensity == pytest.approx(3.0, rel=0.02)
+    np.testing.assert_allclose(after.lights["Key/1"].color, [1.0, 0.5, 0.25], rtol=0.02)
+    assert after.lights["Fill"].intensity == pytest.approx(0.4, rel=0.05)
+    assert after.lights["Off"] == look.lights["Off"]
+
+
+@pytest.mark.parametrize("tone", ["none", "agx", "filmic"])
+def test_the_tone_map_of_the_view_is_inverted(gathered, render, tone):
+    look, wanted = look_of(gathered, tone=tone), look_of(gathered, tone=tone, **WANTED)
+    display = to_bytes(tone_map(render(wanted), 0.5, tone))
+    result = match_look(look, render, MatchRequest(reference=png_bytes(display)))
+    assert relative_error(render(matched(look, result)), render(wanted)) < 0.02
+
+
+def test_the_exposure_of_a_picture_can_be_free(gathered, render, tmp_path):
+    """Ten times as bright as this look can tell: without exposure, the match is the current look."""
+    look = look_of(gathered)
+    data = exr_bytes(10 * render(look), tmp_path)
+    fitted = match_look(look, render, MatchRequest(reference=data, fits_exposure=True))
+    assert (fitted.operations, fitted.match.residual) == ([], pytest.approx(0.0, abs=1e-5))
+    absolute = match_look(look, render, MatchRequest(reference=data))
+    assert absolute.match.stops["/environment"] == pytest.approx(np.log2(10), abs=0.02)
+
+
+def test_a_picture_counts_only_in_its_strokes(gathered, render, tmp_path):
+    look, wanted = look_of(gathered), look_of(gathered, **WANTED)
+    picture = render(wanted).copy()
+    picture[:, 20:] = 100.0
+    left = np.zeros(picture.shape[:2], np.float32)
+    left[:, :20] = 1.0
+    request = MatchRequest(lambda size: [Stroke("reference", left)], exr_bytes(picture, tmp_path))
+    assert match_look(look, render, request).match.residual < 0.02
+
+
+def test_clipped_and_transparent_pixels_have_no_weight(gathered):
+    pixels = np.full((4, 4, 4), 128, np.uint8)
+    pixels[..., 3] = 255
+    pixels[0, 0] = 255
+    pixels[1, 1, 3] = 0
+    target = read_reference(png_bytes(pixels), look_of(gathered, tone="none").display, (4, 4))
+    expected = np.full((4, 4), 1.0)
+    expected[0, 0] = expected[1, 1] = 0.0
+    np.testing.assert_array_equal(target.weights, expected)
+    np.testing.assert_allclose(target.radiance[2, 2], 0.21586 / 2**0.5, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("size", "columns"), [((8, 4), slice(2, 6)), ((4, 4), slice(0, 4))])
+def test_another_aspect_ratio_is_cropped_about_the_center(gathered, size, columns):
+    picture = np.arange(size[0], dtype=np.uint8)[None, :, None] * np.ones((size[1], 1, 3), np.uint8) * 20
+    target = read_reference(png_bytes(picture), look_of(gathered, tone="none").display, (4, 4))
+    inner = read_reference(png_bytes(picture[:, columns]), look_of(gathered, tone="none").display, (4, 4))
+    np.testing.assert_allclose(target.radiance, inner.radiance, rtol=1e-5)
+
+
+def test_texels_that_are_not_numbers_have_no_weight(gathered, tmp_path):
+    picture = np.ones((4, 4, 3), np.float32)
+    picture[1, 2, 0] = np.nan
+    target = read_reference(exr_bytes(picture, tmp_path), look_of(gathered).display, (2, 2))
+    np.testing.assert_allclose(target.weights, [[1.0, 0.75], [1.0, 1.0]])
+    np.testing.assert_allclose(target.radiance, 1.0)
+
+
+def test_jpeg_is_read(gathered):
+    file = io.BytesIO()
+    Image.new("RGB", (16, 12), (128, 128, 128)).save(file, "JPEG")
+    target = read_reference(file.getvalue(), look_of(gathered, tone="none").display, (4, 3))
+    np.testing.assert_allclose(target.radiance, 0.21586 / 2**0.5, rtol=0.02)
+
+
+@pytest.mark.parametrize("data", [b"", b"no picture", b"\x76\x2f\x31\x01", b"#?RADIANCE\n"])
+def test_a_damaged_picture_is_an_error(gathered, data):
+    with pytest.raises(SceneError, match="reference picture"):
+        read_reference(data, look_of(gathered).display, (4, 4))
+
+
+def test_shadow_catchers_are_refused(gathered, render):
+    look = look_of(gathered)
+    floor = look.materials["Floor"].model_copy(update={"shadow_catcher": True})
+    with pytest.raises(EditError, match="shadow catcher"):
+        load_sources(look.model_copy(update={"materials": {**look.materials, "Floor": floor}}), render)
+
+
+def test_the_rotation_of_the_environment_comes_back(gathered, render, tmp_path):
+    look, wanted = look_of(gathered), look_of(gathered, environment={"rotation": 130.0, "intensity": 0.5})
+    data = exr_bytes(render(wanted), tmp_path)
+    result = match_look(look, render, MatchRequest(reference=data, rotates=True))
+    assert matched(look, result).environment.rotation == pytest.approx(130.0, abs=2.0)
+    locked = match_look(look, render, MatchRequest(reference=data, rotates=True, locked=frozenset(["/environment"])))
+    assert matched(look, locked).environment == look.environment
