@@ -163,6 +163,12 @@ class LocalLightTransport(Protocol):
         """Return the image that a light's surfaces emit; None if they emit as in the scene."""
         ...
 
+    def is_lit_behind(
+        self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
+    ) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for rays that start on a surface that a light with this link lights."""
+        ...
+
     def check_links(self, links: Iterable[Link]) -> None:
         """Require that the scene has all objects of some links. Raises ParameterError, StoreError."""
         ...

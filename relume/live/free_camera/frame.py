@@ -402,9 +402,8 @@ def _lobe_visibility(
     if not widths:
         return np.zeros((len(viewed.material), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
     lobe_lights = transfer.lobe_lights(light.environment, widths)
-    return trace_lobe_visibility(
-        viewed, transfer.light_visibility_bits(light.environment.link), lobe_lights, lobes, out
-    )
+    visible = transfer.light_visibility_bits(light.environment.link)
+    return trace_lobe_visibility(viewed, visible, lobe_lights, lobes, out)
 
 
 def _highlight_light_sums(transfer: FreeCameraTransfer, state: FrameRequestState, viewed: ViewedProbes) -> F32:

@@ -228,7 +228,7 @@ class BakedFreeCamera:
     def _vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
         on_all, link = unlinked(element)
         if link is not None:
-            return self.vectors(on_all, without_sun_disks) * self._is_lit(link)[:, None, None]
+            return self._darkened(self.vectors(on_all, without_sun_disks), link)
         probes = self.stored_scene.probes
         rays: list[RayList] = list(self.light_transport.local.rays_to(element, probes, is_coarse=True))
         if element.paths.has_indirect:
@@ -251,8 +251,7 @@ class BakedFreeCamera:
         """
         on_all, link = unlinked(element)
         if link is not None:
-            is_lit = self._is_lit(link)[probe_indices, None, None]
-            return self.fast_vectors(on_all, probe_indices, without_sun_disks) * is_lit
+            return self._darkened(self.fast_vectors(on_all, probe_indices, without_sun_disks), link, probe_indices)
         probes, rays = self.stored_scene.probes.rows(probe_indices), list[RayList]()
         if element.paths.direct:
             for source in element.local:
@@ -304,14 +303,10 @@ class BakedFreeCamera:
     ) -> tuple[HardShadowLight, ...]:
         """Return sun disks and small area lights, with their unoccluded light at some probes (None: all)."""
         probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)
-        rows = slice(None) if probe_indices is None else probe_indices
-        environment = self._is_lit(light.environment.link)[rows, None, None]
+        suns, link = self.sun_disks.hard_shadow_lights(light, probes), light.environment.link
         shadow_lights = [
-            *(
-                sun._replace(vectors=sun.vectors * environment)
-                for sun in self.sun_disks.hard_shadow_lights(light, probes)
-            ),
-            *(self._hard_shadow_light(source, probes, rows) for source in hard_shadow_lights(light)),
+            *(sun._replace(vectors=self._darkened(sun.vectors, link, probe_indices)) for sun in suns),
+            *(self._hard_shadow_light(source, probes, probe_indices) for source in hard_shadow_lights(light)),
         ]
         return (
             tuple(shadow_lights)
@@ -320,11 +315,11 @@ class BakedFreeCamera:
         )
 
     def _hard_shadow_light(
-        self, source: LightSource, probes: SurfacePoints, rows: slice | NDArray[np.intp]
+        self, source: LightSource, probes: SurfacePoints, probe_indices: NDArray[np.intp] | None
     ) -> HardShadowLight:
         local, (geometry, gain) = self.light_transport.local, source
         rays = local.unoccluded_rays(geometry._replace(link=None), probes)
-        vectors = ray_incident_coefficients(probes, [rays]) * self._is_lit(geometry.link)[rows, None, None]
+        vectors = self._darkened(ray_incident_coefficients(probes, [rays]), geometry.link, probe_indices)
         casters = local.linked.casters(geometry.shadow_link)
         return HardShadowLight(geometry, local_shadow_targets(geometry), vectors, np.array(gain, np.float32), casters)
 
@@ -363,12 +358,12 @@ class BakedFreeCamera:
             return self.light_transport.local.unoccluded(on_all, self.stored_scene.probes.rows(rows))
 
         environment = cache.get_value((*key, light.environment.unlinked, is_preview), compute_environment)
-        is_lit = self._is_lit(light.environment.link)[rows, None]
-        radiance = environment * is_lit * np.array(light.environment_gain, np.float32)
+        environment = self._darkened(environment, light.environment.link, rows)
+        radiance = environment * np.array(light.environment_gain, np.float32)
         for geometry, gain in light.local:
             if geometry.kind != "mesh":
                 irradiance = cache.get_value((*key, geometry), lambda geometry=geometry: compute_local(geometry))  # type: ignore[misc]
-                irradiance = irradiance * self._is_lit(geometry.link)[rows]
+                irradiance = self._darkened(irradiance, geometry.link, rows)
                 radiance += np.outer(irradiance, np.array(gain, np.float32) / np.float32(np.pi))
         out = np.zeros((self.stored_scene.probes.num_points, 3), np.float32)
         out[rows] = radiance
@@ -412,7 +407,7 @@ class BakedFreeCamera:
             return self._light_visibility_bits
 
         def compute() -> NDArray[np.uint8]:
-            return self._light_visibility_bits * self._is_lit(link)[:, None]
+            return self._darkened(self._light_visibility_bits, link)
 
         return self.cache.transient.get_value((self.key, "visible lights", link), compute)
 
@@ -420,18 +415,22 @@ class BakedFreeCamera:
         """See `relume.live.opened.linked_surfaces.LinkedSurfaces.check`."""
         self.light_transport.local.check_links(links)
 
-    def _is_lit(self, link: Link | None) -> Shaped[NDArray[np.bool_], " probes"]:
-        """True for the probes of surfaces that a light with this link lights.
+    def _darkened(
+        self, values: NDArray[Any], link: Link | None, probe_indices: NDArray[np.intp] | None = None
+    ) -> NDArray[Any]:
+        """Return values of probes (None: all) that are zero where a light with this link does not light the surface."""
+        if link is None:
+            return values
+        is_lit = self._is_lit(link) if probe_indices is None else self._is_lit(link)[probe_indices]
+        return values * is_lit.reshape(-1, *[1] * (values.ndim - 1))
 
-        Rays would miss the surfaces of probes at their edges.
-        """
+    def _is_lit(self, link: Link) -> Shaped[NDArray[np.bool_], " probes"]:
+        """True for the probes of linked surfaces; a ray from a probe at an edge would miss its surface."""
         lattice_nodes, grid = self.stored_scene.lattice_nodes, self.stored_scene.probe_grid
-        is_lit = np.full(self.stored_scene.probes.num_points, link is None)
-        if link is not None:
-            is_lit_face = self.light_transport.local.linked.faces(link)
-            is_lit_node = np.repeat(np.repeat(is_lit_face, 2), num_nodes(grid.num_rows.ravel()))
-            node = grid.node_index[is_lit_node]
-            is_lit[lattice_nodes.probe[node][lattice_nodes.weight[node] > 0]] = True
+        is_lit_face = np.repeat(self.light_transport.local.linked.faces(link), 2)
+        node = grid.node_index[np.repeat(is_lit_face, num_nodes(grid.num_rows.ravel()))]
+        is_lit = np.zeros(self.stored_scene.probes.num_points, np.bool_)
+        is_lit[lattice_nodes.probe[node][lattice_nodes.weight[node] > 0]] = True
         return is_lit
 
     @cached_property

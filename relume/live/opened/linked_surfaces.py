@@ -107,21 +107,25 @@ class LinkedSurfaces:
         """True for the triangles that a link names. Raises as `check` does."""
         return self._meshes(link)[self._face_mesh]
 
-    def is_lit(self, link: Link | None, points: SurfacePoints) -> Shaped[Mask, " n"]:
-        """True for points on surfaces that a light with this link lights."""
-        return np.ones(points.num_points, np.bool_) if link is None else self._is_linked(link, points)
+    def is_lit(
+        self, link: Link | None, position: Shaped[F32, "n 3"], outward: Shaped[F32, "n 3"]
+    ) -> Shaped[Mask, " n"]:
+        """True for points on surfaces that a light with this link lights.
+
+        Args:
+            link: of the light. position: of the points, offset from their surface. outward: directions away from it.
+        """
+        if link is None:
+            return np.ones(len(position), np.bool_)
+        face = trace_rays(self._embree, position, -outward, STOP_AT_PARTIAL).face
+        return (face >= 0) & self.faces(link)[face]
 
     def darken(self, link: Link | None, points: SurfacePoints, *light: NDArray[Any]) -> None:
         """Set light of points to zero, in place, where a light with this link does not light the surface."""
         if link is not None:
-            is_dark = ~self._is_linked(link, points)
+            is_dark = ~self.is_lit(link, points.position, points.normal)
             for values in light:
                 values[is_dark] = 0
-
-    def _is_linked(self, link: Link, points: SurfacePoints) -> Mask:
-        """Find the mesh below each point; none of a link is below a point without a mesh."""
-        face = trace_rays(self._embree, points.position, -points.normal, STOP_AT_PARTIAL).face
-        return (face >= 0) & self.faces(link)[face]
 
     def casters(self, shadow_link: Link | None) -> EmbreeScene:
         """Return the triangles that cast the shadows of a light."""
@@ -164,7 +168,7 @@ class LightLinks:
         if self.environment is not None:
             escapes, throughput = escapes.copy(), paths.throughput.copy()
             self.darken(self.environment, points, escapes)
-            is_lit = self.linked.is_lit(self.environment, points)
+            is_lit = self.linked.is_lit(self.environment, points.position, points.normal)
             is_lit_entry = np.where(
                 paths.face < 0, np.repeat(is_lit, np.diff(paths.first)), self.linked.faces(self.environment)[paths.face]
             )

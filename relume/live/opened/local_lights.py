@@ -93,6 +93,12 @@ class LocalLights:
         """The surfaces that lights light, and those that cast their shadows."""
         return LinkedSurfaces(self._store, self.positions, self.faces, self.embree, self._cache, self._key)
 
+    def is_lit_behind(
+        self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
+    ) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for rays that start on a surface that a light with this link lights."""
+        return self.linked.is_lit(link, origins, directions)
+
     def check_links(self, links: Iterable[Link]) -> None:
         """See `LinkedSurfaces.check`."""
         self.linked.check(links)

@@ -52,7 +52,8 @@ class LocalPatchLight:
 
     def is_lit(self, link: Link | None) -> Shaped[NDArray[np.bool_], " patches"]:
         """True for the patches that a light with this link lights: each is of one mesh."""
-        return self._local.linked.is_lit(link, self._patches.first_points(np.arange(self._patches.num_patches)))
+        points = self._patches.first_points(np.arange(self._patches.num_patches))
+        return self._local.linked.is_lit(link, points.position, points.normal)
 
     def irradiance(self, geometry: LightGeometry) -> Shaped[F32, " patches"]:
         """Return the irradiance of each patch, averaged over its sample points."""

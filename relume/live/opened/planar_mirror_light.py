@@ -169,7 +169,7 @@ class MirrorLightTransfer:
     def _lit_patches(self, environment: EnvironmentKey) -> Shaped[NDArray[np.bool_], " patches"]:
         """True for the patches that an environment lights."""
         points = self._patches.first_points(np.arange(self._patches.num_patches))
-        return self._linked.is_lit(environment.link, points)
+        return self._linked.is_lit(environment.link, points.position, points.normal)
 
     def _lights_of(self, environment: EnvironmentKey) -> TriangleLights:
         return self._find_lights(environment, LightQuality.EXACT)

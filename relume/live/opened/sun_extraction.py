@@ -65,8 +65,6 @@ class SunExtractor:
             return
         key, gain = light.environment.unlinked, np.array(light.environment_gain, np.float32)
         for k, sun_disk in enumerate(self._split(key.map).sun_disks):
-            vectors, targets = (
-                unoccluded_sun_vectors(sun_disk, key.rotation, points),
-                sun_shadow_targets(sun_disk, key.rotation),
-            )
-            yield HardShadowLight((key, k), targets, vectors, gain, self.light_transport.local.embree)
+            vectors = unoccluded_sun_vectors(sun_disk, key.rotation, points)
+            targets, embree = sun_shadow_targets(sun_disk, key.rotation), self.light_transport.local.embree
+            yield HardShadowLight((key, k), targets, vectors, gain, embree)

@@ -47,7 +47,7 @@ def test_linked_light_lights_exactly_the_included_receiver(gathered, light, name
     unlinked = rendered(gathered, light, DARK, "direct")
     linked = rendered(gathered, light | {"link": {"include": names}}, DARK, "direct")
     red = shown(gathered, "Red")
-    assert unlinked[red].min() >= 0 and unlinked[red].mean() > 0.01
+    assert unlinked[red].mean() > 0.01
     np.testing.assert_allclose(linked[red], unlinked[red], rtol=1e-6)
     assert not linked[shown(gathered, "Floor") | shown(gathered, "Blue")].any()
 
