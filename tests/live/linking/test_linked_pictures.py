@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exact_pictures import render_uncached
+from pure_pixels import shown
 from session_edits import make_look
 
 DARK = {"intensity": 0.0}
@@ -28,17 +29,6 @@ def rendered(transfer, light=None, environment=None, show="all"):
         document["transport"]["show"] = show
 
     return render_uncached(transfer, make_look(transfer, edit))
-
-
-def shown(transfer, name):
-    """Pixels whose samples are all of one material."""
-    view = transfer.views["front"]
-    pixels = np.unique(view.pixel[view.rows(transfer.material_names.index(name))])
-    others = [view.pixel[view.rows(k)] for k, other in enumerate(transfer.material_names) if other != name]
-    background = view.pixel[view.num_surface_samples :]
-    mask = np.zeros(view.height * view.width, np.bool_)
-    mask[np.setdiff1d(pixels, np.concatenate([*others, background]))] = True
-    return mask.reshape(view.height, view.width)
 
 
 @pytest.mark.parametrize("names", [RED, OBJECT], ids=["material", "object"])

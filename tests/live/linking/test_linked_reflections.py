@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exact_pictures import render_uncached
+from pure_pixels import shown
 from session_edits import bake_corner_scene, make_look
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
@@ -81,18 +82,16 @@ def test_parts_of_a_light_add_up_in_polished_surfaces(polished, source, names):
         emitted = rendered(polished, lamp={"link": {"include": {}}})
         assert emitted.max() == pytest.approx(6, rel=1e-3)
         unlinked = unlinked + emitted
-    np.testing.assert_allclose(sum(parts), unlinked, rtol=2e-3, atol=1e-5 * unlinked.max())
+    # rays of narrow lobes are split where the picture varies most, and negative light of patches is clamped
+    assert np.sqrt(np.mean((sum(parts) - unlinked) ** 2) / np.mean(unlinked**2)) < 0.01
 
 
 def test_a_mirror_that_is_not_linked_still_shows_what_the_light_lights(polished):
     """The light is linked to the surface that it falls on, not to the mirror."""
-    part = rendered(polished, environment={"link": {"include": {"objects": ["floor"]}}})
-    view = polished.views["front"]
-    blue = np.zeros(view.width * view.height, np.bool_)
-    blue[view.pixel[view.rows(polished.material_names.index("Blue"))]] = True
-    assert part.reshape(-1, 3)[blue].mean() > 0.01
-    direct = rendered(polished, environment={"link": {"include": {"objects": ["floor"]}}}, show="direct")
-    assert direct.reshape(-1, 3)[blue].mean() < 0.1 * part.reshape(-1, 3)[blue].mean()
+    floor = {"link": {"include": {"objects": ["floor"]}}}
+    blue = shown(polished, "Blue")
+    assert rendered(polished, environment=floor)[blue].mean() > 0.01
+    assert not rendered(polished, environment=floor, show="direct")[blue].any()
 
 
 LINKS = {
@@ -116,7 +115,7 @@ def test_linked_point_light_equals_the_reference(diffuse, link, show):
     def error(image):
         """RMS error; the noise of two passes is independent, so it cancels."""
         first, second = (image - expected for expected in passes)
-        return np.sqrt(np.mean(first * second) / np.mean(passes[0] * passes[1]))
+        return np.sqrt(abs(np.mean(first * second) / np.mean(passes[0] * passes[1])))
 
     assert error(render_uncached(transfer, look_of(transfer, point={}, show=show))) > 0.1
     assert error(render_uncached(transfer, look)) < (1e-3 if show == "direct" else 0.03)
@@ -124,15 +123,14 @@ def test_linked_point_light_equals_the_reference(diffuse, link, show):
 
 def test_linked_environment_of_the_reference_lights_exactly_the_linked_surfaces(diffuse):
     scene, transfer = diffuse
-    floor = transfer.views["front"].material_ids() == 0
 
     def reference(link):
         return reference_image(scene, "front", look_of(transfer, environment={"link": link}, show="direct"), SIZE, 0)
 
-    unlinked, included, excluded = (
-        reference(link) for link in (None, {"include": {"objects": ["floor"]}}, {"exclude": {"materials": ["Floor"]}})
-    )
-    np.testing.assert_allclose(included + excluded, unlinked, rtol=1e-5, atol=1e-6)
-    assert min(included[floor].mean(), excluded[~floor].mean()) > 0.01
-    assert np.median(excluded[floor]) == 0
-    assert np.median(included[~floor]) == 0
+    included, excluded = (reference({mode: {"materials": ["Floor"]}}) for mode in ("include", "exclude"))
+    unlinked, background = reference(None), reference({"include": {}})
+    np.testing.assert_allclose(included + excluded, unlinked + background, rtol=1e-5, atol=1e-6)
+    floor, red = shown(transfer, "Floor"), shown(transfer, "Red")
+    assert min(included[floor].mean(), excluded[red].mean()) > 0.01
+    assert not excluded[floor].any()
+    assert not included[red].any()
