@@ -24,16 +24,16 @@ LINK = {"include": {"materials": [MATERIAL], "objects": ["Chair"]}}
 
 def linked(link: Any, shadow_link: Any = None, environment: Any = None) -> dict[str, Any]:
     return {
-        "lights": {"Lamp": {**POINT, "link": link, "shadow_link": shadow_link}},
+        "lights": {"Key light": {**POINT, "link": link, "shadow_link": shadow_link}},
         "environment": {"link": environment},
     }
 
 
 def test_lights_and_environment_light_all_surfaces_by_default() -> None:
-    look = validate({"lights": {"Lamp": POINT}}, DEFAULT)
-    assert (look.lights["Lamp"].link, look.lights["Lamp"].shadow_link, look.environment.link) == (None, None, None)
-    document = complete({"lights": {"Lamp": POINT}}, DEFAULT)
-    assert (document["lights"]["Lamp"]["link"], document["environment"]["link"]) == (None, None)
+    look = validate({"lights": {"Key light": POINT}}, DEFAULT)
+    assert (look.lights["Key light"].link, look.lights["Key light"].shadow_link, look.environment.link) == (None, None, None)
+    document = complete({"lights": {"Key light": POINT}}, DEFAULT)
+    assert (document["lights"]["Key light"]["link"], document["environment"]["link"]) == (None, None)
 
 
 def test_looks_of_older_stores_have_no_links() -> None:
@@ -51,18 +51,18 @@ def test_equal_sets_of_names_are_equal_keys(mode: str) -> None:
     """A link is part of the geometry of its light: order and repetition of its names change no cache key."""
     links = [{mode: {"objects": ["b", "a", "b"]}}, {mode: {"objects": ["a", "b"], "materials": []}}]
     first, second = (validate(linked(link, link, link), DEFAULT) for link in links)
-    geometry = first.lights["Lamp"].geometry
-    assert geometry == second.lights["Lamp"].geometry
-    assert hash(geometry) == hash(second.lights["Lamp"].geometry)
-    assert digest(geometry) == digest(second.lights["Lamp"].geometry)
+    geometry = first.lights["Key light"].geometry
+    assert geometry == second.lights["Key light"].geometry
+    assert hash(geometry) == hash(second.lights["Key light"].geometry)
+    assert digest(geometry) == digest(second.lights["Key light"].geometry)
     assert first.environment.key == second.environment.key
-    other = validate(linked(None, links[0]), DEFAULT).lights["Lamp"].geometry
+    other = validate(linked(None, links[0]), DEFAULT).lights["Key light"].geometry
     assert digest(geometry) != digest(other)
 
 
 def test_a_link_to_nothing_is_allowed() -> None:
     look = validate(linked({"include": {}}), DEFAULT)
-    assert look.lights["Lamp"].link is not None
+    assert look.lights["Key light"].link is not None
 
 
 @pytest.mark.parametrize(
@@ -82,9 +82,9 @@ def test_a_link_to_nothing_is_allowed() -> None:
         ({"exclude": {"materials": ["Gone", MATERIAL, "Lost"]}}, "/exclude/materials"),
     ],
 )
-@pytest.mark.parametrize("field", ["/lights/Lamp/link", "/lights/Lamp/shadow_link", "/environment/link"])
+@pytest.mark.parametrize("field", ["/lights/Key light/link", "/lights/Key light/shadow_link", "/environment/link"])
 def test_invalid_links_are_rejected(link: Any, pointer: str, field: str) -> None:
-    arguments = [link if field == name else None for name in ("/lights/Lamp/link", "/lights/Lamp/shadow_link")]
+    arguments = [link if field == name else None for name in ("/lights/Key light/link", "/lights/Key light/shadow_link")]
     with pytest.raises(ParameterError) as error:
         validate(linked(*arguments, link if field == "/environment/link" else None), DEFAULT)
     assert str(error.value).startswith(field + pointer)
@@ -101,7 +101,7 @@ def test_environment_has_no_shadow_link() -> None:
 
 
 def test_patches_and_differences_carry_links() -> None:
-    before = complete({"lights": {"Lamp": POINT}}, DEFAULT)
+    before = complete({"lights": {"Key light": POINT}}, DEFAULT)
     after = complete(linked(LINK, environment=LINK), DEFAULT)
     patched = apply_patch(before, diff_looks(before, after), DEFAULT)
     assert patched == after
@@ -109,11 +109,11 @@ def test_patches_and_differences_carry_links() -> None:
 
 def test_links_switch_half_way_between_keyframes() -> None:
     looks = [complete(linked(link), DEFAULT) for link in (LINK, {"exclude": {"materials": [], "objects": ["Table"]}})]
-    links = [interpolate_looks(looks, fraction)["lights"]["Lamp"]["link"] for fraction in (0.4, 0.6)]
-    assert links == [look["lights"]["Lamp"]["link"] for look in looks]
+    links = [interpolate_looks(looks, fraction)["lights"]["Key light"]["link"] for fraction in (0.4, 0.6)]
+    assert links == [look["lights"]["Key light"]["link"] for look in looks]
 
 
 def test_light_mixes_have_no_links() -> None:
     """They hold brightness and color alone, for scenes with other objects."""
     mix = make_light_mix(validate(linked(LINK, LINK, LINK), DEFAULT), "scene")
-    assert not {"link", "shadow_link"} & (mix["lights"]["Lamp"].keys() | mix["environment"].keys())
+    assert not {"link", "shadow_link"} & (mix["lights"]["Key light"].keys() | mix["environment"].keys())

@@ -24,7 +24,7 @@ def test_default_look_has_every_field(default):
     assert default["environment"] == {
         "map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0, "link": None,
     }  # fmt: skip
-    plain = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True}
+    plain = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "link": None, "shadow_link": None}
     spot = {"kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -1.0, 0.0], "cone": [20.0, 30.0]}
     panel = {"kind": "mesh", "material": "Teapot", "image": None, "emission": [5.0, 5.0, 4.0]}
     assert default["lights"] == {"Key": {**plain, **spot, "emission": [1.0, 1.0, 1.0]}, "Panel": {**plain, **panel}}

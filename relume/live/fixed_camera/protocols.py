@@ -166,7 +166,11 @@ class LocalLightTransport(Protocol):
     def is_lit_behind(
         self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
     ) -> Shaped[NDArray[np.bool_], " n"]:
-        """True for rays that start on a surface that a light with this link lights."""
+        """True for rays that start on a surface that a light with this link lights.
+
+        Args:
+            link: of the light. origins: where the rays start. directions: away from the surface.
+        """
         ...
 
     def check_links(self, links: Iterable[Link]) -> None:

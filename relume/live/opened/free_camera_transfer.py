@@ -303,9 +303,9 @@ class BakedFreeCamera:
     ) -> tuple[HardShadowLight, ...]:
         """Return sun disks and small area lights, with their unoccluded light at some probes (None: all)."""
         probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)
-        suns, link = self.sun_disks.hard_shadow_lights(light, probes), light.environment.link
+        sun_lights, link = self.sun_disks.hard_shadow_lights(light, probes), light.environment.link
         shadow_lights = [
-            *(sun._replace(vectors=self._darkened(sun.vectors, link, probe_indices)) for sun in suns),
+            *(sun._replace(vectors=self._darkened(sun.vectors, link, probe_indices)) for sun in sun_lights),
             *(self._hard_shadow_light(source, probes, probe_indices) for source in hard_shadow_lights(light)),
         ]
         return (

@@ -96,7 +96,11 @@ class LocalLights:
     def is_lit_behind(
         self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
     ) -> Shaped[NDArray[np.bool_], " n"]:
-        """True for rays that start on a surface that a light with this link lights."""
+        """True for rays that start on a surface that a light with this link lights.
+
+        Args:
+            link: of the light. origins: where the rays start. directions: away from the surface.
+        """
         return self.linked.is_lit(link, origins, directions)
 
     def check_links(self, links: Iterable[Link]) -> None:

@@ -24,18 +24,18 @@ def corner_of(blue_terms):
         Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]},)),
         Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},)),
         Material("Blue", blue_terms),
-        Material("Lamp", ({"model": "lambert", "color": [0.2, 0.2, 0.2]},)),
+        Material("Plate", ({"model": "lambert", "color": [0.2, 0.2, 0.2]},)),
     ]
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     red = quad("red", [[-1, 0, 1], [-1, 0, -1], [-1, 1.5, -1], [-1, 1.5, 1]], 1, tangent=(0, 1, 0))
     blue = quad("blue", [[-1, 0, -1], [1, 0, -1], [1, 1.5, -1], [-1, 1.5, -1]], 2)
     roof = quad("roof", [[-0.3, 0.5, 0.4], [0.3, 0.5, 0.4], [0.3, 0.5, -0.2], [-0.3, 0.5, -0.2]], 1)
-    lamp = quad("lamp", [[0.4, 1.2, 0.6], [0.4, 1.2, 0.2], [0.8, 1.2, 0.2], [0.8, 1.2, 0.6]], 3)
+    plate = quad("plate", [[0.4, 1.2, 0.6], [0.4, 1.2, 0.2], [0.8, 1.2, 0.2], [0.8, 1.2, 0.6]], 3)
     environment = np.full((16, 32, 3), 0.3, np.float32)
     environment[2:5, 16:20] = 30
     camera = make_camera("front", (1.2, 1.6, 2.2), (-0.2, 0.4, -0.3), 0.7)
-    tiny = make_tiny_scene(floor, red, blue, roof, lamp, camera=camera, environment=environment, materials=materials)
-    light = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": [6.0, 6.0, 6.0]})
+    tiny = make_tiny_scene(floor, red, blue, roof, plate, camera=camera, environment=environment, materials=materials)
+    light = Light("Plate", {"kind": "mesh", "material": "Plate", "emission": [6.0, 6.0, 6.0]})
     return make_scene("corner", tiny.meshes, tiny.materials, tiny.cameras, tiny.environment, lights=(light,))
 
 
@@ -57,9 +57,9 @@ def polished(tmp_path_factory):
     return bake_corner_scene(corner_of(POLISHED), "gather", tmp_path_factory.mktemp("polished"))
 
 
-def look_of(transfer, lamp=None, point=None, environment=None, show="all"):
+def look_of(transfer, plate=None, point=None, environment=None, show="all"):
     def edit(document):
-        document["lights"]["Lamp"].update({"enabled": False} if lamp is None else lamp)
+        document["lights"]["Plate"].update({"enabled": False} if plate is None else plate)
         document["lights"].update({} if point is None else {"A": POINT | point})
         document["environment"].update(DARK if environment is None else environment)
         document["background"].update({"kind": "color", "color": [0.0, 0.0, 0.0]})
@@ -73,13 +73,13 @@ def rendered(transfer, **changes):
 
 
 @pytest.mark.parametrize("names", [{"materials": ["Blue"]}, {"objects": ["floor"]}], ids=["mirror", "floor"])
-@pytest.mark.parametrize("source", ["lamp", "point", "environment"])
+@pytest.mark.parametrize("source", ["plate", "point", "environment"])
 def test_parts_of_a_light_add_up_in_polished_surfaces(polished, source, names):
     parts = [rendered(polished, **{source: {"link": {mode: names}}}) for mode in ("include", "exclude")]
     unlinked = rendered(polished, **{source: {}})
     assert min(part.mean() for part in parts) > 1e-3
-    if source == "lamp":  # both parts show the surface of the lamp itself
-        emitted = rendered(polished, lamp={"link": {"include": {}}})
+    if source == "plate":  # both parts show the surface of the plate itself
+        emitted = rendered(polished, plate={"link": {"include": {}}})
         assert emitted.max() == pytest.approx(6, rel=1e-3)
         unlinked = unlinked + emitted
     # rays of narrow lobes are split where the picture varies most, and negative light of patches is clamped
