@@ -31,7 +31,11 @@ def linked(link: Any, shadow_link: Any = None, environment: Any = None) -> dict[
 
 def test_lights_and_environment_light_all_surfaces_by_default() -> None:
     look = validate({"lights": {"Key light": POINT}}, DEFAULT)
-    assert (look.lights["Key light"].link, look.lights["Key light"].shadow_link, look.environment.link) == (None, None, None)
+    assert (look.lights["Key light"].link, look.lights["Key light"].shadow_link, look.environment.link) == (
+        None,
+        None,
+        None,
+    )
     document = complete({"lights": {"Key light": POINT}}, DEFAULT)
     assert (document["lights"]["Key light"]["link"], document["environment"]["link"]) == (None, None)
 
@@ -84,7 +88,9 @@ def test_a_link_to_nothing_is_allowed() -> None:
 )
 @pytest.mark.parametrize("field", ["/lights/Key light/link", "/lights/Key light/shadow_link", "/environment/link"])
 def test_invalid_links_are_rejected(link: Any, pointer: str, field: str) -> None:
-    arguments = [link if field == name else None for name in ("/lights/Key light/link", "/lights/Key light/shadow_link")]
+    arguments = [
+        link if field == name else None for name in ("/lights/Key light/link", "/lights/Key light/shadow_link")
+    ]
     with pytest.raises(ParameterError) as error:
         validate(linked(*arguments, link if field == "/environment/link" else None), DEFAULT)
     assert str(error.value).startswith(field + pointer)
