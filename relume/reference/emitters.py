@@ -125,8 +125,8 @@ def emitters(scene: Scene, geometry: SceneBuffers, look: Look) -> list[Reference
             image = scene.materials[material].textures.get("emission")
         is_dark = isinstance(light, MeshLook) and not _areas(triangles).any()
         if any(light.gain) and not is_dark:
-            casters, meshes = shadow_casters(scene, geometry, light.shadow_link), lit_meshes(scene, light.link)
-            local_lights.append(ReferenceEmitter(light, triangles, is_two_sided, uvs, image, casters, meshes))
+            casters, lit = shadow_casters(scene, geometry, light.shadow_link), lit_meshes(scene, light.link)
+            local_lights.append(ReferenceEmitter(light, triangles, is_two_sided, uvs, image, casters, lit))
     return local_lights
 
 

@@ -58,4 +58,4 @@ def lit_points(
     if meshes is None:
         return np.ones(len(position), np.bool_)
     face = trace_rays(geometry.embree, position, -normal, STOP_AT_PARTIAL).face
-    return (face >= 0) & np.array(meshes)[geometry.face_mesh[face]]
+    return np.asarray((face >= 0) & np.array(meshes)[geometry.face_mesh[face]])
