@@ -1,16 +1,18 @@
-"""lights.rmse_…: direct light of each kind against Mitsuba 3; lights.intensity_fps: frames per second of a dimmed
-light.
+"""lights.rmse_…: direct light of each kind, and of a linked light, against Mitsuba 3; lights.intensity_fps: frames per
+second of a dimmed light.
 
 The Cornell box, 128×128 pixels, diffuse; the environment is black. Images are compared by means over blocks of 4×4
 pixels, with Mitsuba's noise removed: a pixel has one view sample inside surfaces and many in Mitsuba, which differ
 along the edges of hard shadows. Mitsuba's spot falls off in angle and ours in cosine: the compared cone has an edge of
-a tenth of a degree. For the installation of Mitsuba see bench/relume_bench/mitsuba.py.
+a tenth of a degree. Mitsuba has no links: for the linked light, surfaces that are not linked are black there and still
+cast shadows, which is the same direct light. For the installation of Mitsuba see bench/relume_bench/mitsuba.py.
 """
 
 from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,7 @@ from relume.look import Look, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.cornell import cornell_box
-from relume.scene.model import Scene
+from relume.scene.model import Mesh, Scene
 from relume.scene.scene_folder import make_scene
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
@@ -45,6 +47,10 @@ _LIGHTS: dict[str, dict[str, Any]] = {
         "emission": [3.0, 3.0, 3.0],
     },
     "directional": {"kind": "directional", "direction": [-0.4, -1.0, -0.5], "emission": [2.0, 2.0, 2.0]},
+    "linked": {
+        "kind": "point", "position": [0.4, 1.5, 0.6], "emission": [3.0, 2.0, 1.0],
+        "link": {"exclude": {"materials": ["Red wall"], "objects": ["Tall block"]}},
+    },
     "rectangle": {  # in front of the room and above the image: Mitsuba would show it
         "kind": "rectangle", "position": [0.1, 2.3, 1.3], "direction": [0.0, -0.7, -1.0], "rotation": 20.0,
         "size": [0.5, 0.3], "emission": [20.0, 18.0, 15.0],
@@ -70,10 +76,10 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
     scene = make_scene("night", room.meshes, room.materials, room.cameras, night)
     recipe = Recipe("direct", ("front",), size, 20)
     transfer = open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Cache(4 << 30))
-    bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]
     figures = []
     for name, (kind, light) in zip(_NAMES, _LIGHTS.items(), strict=True):
         rendered = render_image(transfer, "front", _make_look(transfer, {"A": light})).astype(np.float64)
+        bsdfs = [bsdf(_lit_terms(scene, mesh, light)) for mesh in scene.meshes]
         job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
         render(scene, size, job, folder)
         reference_passes = read_passes(folder)
@@ -84,6 +90,13 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
         context = {**comparison.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
         figures.append(Figure(name, comparison.error.value, "relative RMSE", context, comparison.error.standard_error))
     return figures
+
+
+def _lit_terms(scene: Scene, mesh: Mesh, light: dict[str, Any]) -> Sequence[dict[str, Any]]:
+    """Terms of a mesh; black if the light is not linked to it."""
+    material, excluded = scene.materials[mesh.material], light.get("link", {"exclude": {}})["exclude"]
+    is_dark = material.name in excluded.get("materials", ()) or mesh.name in excluded.get("objects", ())
+    return ({"model": "lambert", "color": [0.0, 0.0, 0.0]},) if is_dark else material.terms
 
 
 def _make_look(transfer: FixedViewTransfer, lights: dict[str, Any]) -> Look:

@@ -290,6 +290,7 @@ GROUPS = (
             "lights.rmse_point",
             "lights.rmse_spot",
             "lights.rmse_directional",
+            "lights.rmse_linked",
             "lights.rmse_rectangle",
             "lights.intensity_fps",
         ),

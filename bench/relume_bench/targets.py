@@ -131,6 +131,7 @@ TARGETS = {
     "gather.full_bias_tableau": "± 2 %",
     "gather.full_bias_still_life": "± 2 %",
     "gather.full_bias_interior": "± 2 %",
+    "lights.rmse_linked": "≤ 2 %",
     "lights.rmse_point": "≤ 2 %",
     "lights.rmse_rectangle": "≤ 2 %",
     "lights.intensity_fps": "≥ 60",

@@ -152,6 +152,8 @@ class DirectionalLook(TypedDict):
     color: NotRequired[Sequence[float]]
     enabled: NotRequired[bool]
     emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["directional"]]
     direction: NotRequired[Sequence[float]]
 
@@ -185,12 +187,20 @@ class DrawnCurve(TypedDict):
 
 class EnvironmentLook(TypedDict):
     """The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counterclockwise
-    from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
+    from above. `map` names it, see `relume.assets.environments`; None: the scene's own. `link`: the surfaces that it
+    lights; None: all."""
 
     map: NotRequired[str | None]
     intensity: NotRequired[float]
     color: NotRequired[Sequence[float]]
     rotation: NotRequired[float]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+
+
+class ExcludeLink(TypedDict):
+    """All surfaces but these."""
+
+    exclude: NotRequired[SurfaceNames]
 
 
 Fidelity = Literal["preview", "approximate", "incremental", "near_exact", "exact"]
@@ -288,6 +298,12 @@ class ImportOptions(TypedDict):
     time: NotRequired[float | None]
 
 
+class IncludeLink(TypedDict):
+    """Only these surfaces."""
+
+    include: NotRequired[SurfaceNames]
+
+
 class InspectAnswer(TypedDict):
     """server → client: one pixel; `bands` is the contribution of each band of the active curve, per channel."""
 
@@ -351,6 +367,8 @@ class MeshLook(TypedDict):
     color: NotRequired[Sequence[float]]
     enabled: NotRequired[bool]
     emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["mesh"]]
     material: NotRequired[str]
     image: NotRequired[str | None]
@@ -445,6 +463,8 @@ class PointLook(TypedDict):
     color: NotRequired[Sequence[float]]
     enabled: NotRequired[bool]
     emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["point"]]
     position: NotRequired[Sequence[float]]
 
@@ -494,6 +514,8 @@ class RectangleLook(TypedDict):
     color: NotRequired[Sequence[float]]
     enabled: NotRequired[bool]
     emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["rectangle"]]
     position: NotRequired[Sequence[float]]
     direction: NotRequired[Sequence[float]]
@@ -593,6 +615,7 @@ class SceneBody(TypedDict):
     views: Sequence[SceneView]
     materials: Sequence[SceneMaterial]
     lights: Sequence[str]
+    objects: Sequence[str]
     variants: Sequence[SceneVariant]
     warnings: Sequence[SceneWarning]
     import_options: ImportOptions
@@ -671,6 +694,8 @@ class SpotLook(TypedDict):
     color: NotRequired[Sequence[float]]
     enabled: NotRequired[bool]
     emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["spot"]]
     position: NotRequired[Sequence[float]]
     direction: NotRequired[Sequence[float]]
@@ -686,6 +711,13 @@ class StatusMessage(TypedDict):
     view: str
     label: str
     progress: float
+
+
+class SurfaceNames(TypedDict):
+    """Surfaces by name: all of some materials, and all of some objects. Objects are the meshes of the scene."""
+
+    materials: NotRequired[Sequence[str]]
+    objects: NotRequired[Sequence[str]]
 
 
 class TermLook(TypedDict):

@@ -14,6 +14,8 @@ export interface DirectionalLook {
   color: [number, number, number];
   enabled: boolean;
   emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "directional";
   direction: [number, number, number];
 }
@@ -34,12 +36,18 @@ export interface DrawnCurve {
   channels?: string;
 }
 
-/** The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counterclockwise from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
+/** The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counterclockwise from above. `map` names it, see `relume.assets.environments`; None: the scene's own. `link`: the surfaces that it lights; None: all. */
 export interface EnvironmentLook {
   map: string | null;
   intensity: number;
   color: [number, number, number];
   rotation: number;
+  link?: IncludeLink | ExcludeLink | null;
+}
+
+/** All surfaces but these. */
+export interface ExcludeLink {
+  exclude: SurfaceNames;
 }
 
 /** Light through a surface of glass; its material's terms are what it reflects. `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; not of thin glass. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`: index of refraction. */
@@ -48,6 +56,11 @@ export interface GlassLook {
   absorption?: [number, number, number];
   roughness: number;
   ior: number;
+}
+
+/** Only these surfaces. */
+export interface IncludeLink {
+  include: SurfaceNames;
 }
 
 /** A complete, valid look, made by `relume.look.validate`. */
@@ -75,6 +88,8 @@ export interface MeshLook {
   color: [number, number, number];
   enabled: boolean;
   emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "mesh";
   material: string;
   image?: string | null;
@@ -98,6 +113,8 @@ export interface PointLook {
   color: [number, number, number];
   enabled: boolean;
   emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "point";
   position: [number, number, number];
 }
@@ -108,6 +125,8 @@ export interface RectangleLook {
   color: [number, number, number];
   enabled: boolean;
   emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "rectangle";
   position: [number, number, number];
   direction: [number, number, number];
@@ -121,10 +140,18 @@ export interface SpotLook {
   color: [number, number, number];
   enabled: boolean;
   emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "spot";
   position: [number, number, number];
   direction: [number, number, number];
   cone: [number, number];
+}
+
+/** Surfaces by name: all of some materials, and all of some objects. Objects are the meshes of the scene. */
+export interface SurfaceNames {
+  materials?: string[];
+  objects?: string[];
 }
 
 /** One term: color · texture · quotient · Π curves. Drawn curves replace those generated from `params`. `data`: name of the measured material, only for models that need one. `roughness_map`: scales the width of the highlight: "roughness" for the material's own map, "image:<id>" for an uploaded one, null for none. `texture`: a texture channel of the material, or an uploaded image. */
@@ -155,15 +182,15 @@ type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { ki
 
 /** A light of each kind, complete. */
 export const DEFAULT_LIGHTS: LightsByKind = {
-  point: { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0] },
-  spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
-  directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], direction: [0, -1, 0] },
-  rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
-  mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], material: "", image: null },
+  point: { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0] },
+  spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
+  directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, direction: [0, -1, 0] },
+  rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
+  mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, material: "", image: null },
 };
 
 export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "transport" | "display">> = {
-  environment: { map: null, intensity: 1, color: [1, 1, 1], rotation: 0 },
+  environment: { map: null, intensity: 1, color: [1, 1, 1], rotation: 0, link: null },
   background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   transport: { show: "all", bounces: 24 },
   display: { exposure: 0, tone_map: "agx" },

@@ -972,7 +972,7 @@ export interface RoomUpdate {
   edited_by: number[];
 }
 
-/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. `import_options`: for the next import of its file. `size`: sides of its bounding box along x, y and z without a shadow catcher, meters; null for a scene of an older version. */
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. `import_options`: for the next import of its file. `size`: sides of its bounding box along x, y and z without a shadow catcher, meters; null for a scene of an older version. `objects`: names for the links of lights; empty for a scene of an older version, or with more than 2,000. */
 export interface SceneBody {
   id: string;
   name: string;
@@ -980,6 +980,7 @@ export interface SceneBody {
   views: SceneView[];
   materials: SceneMaterial[];
   lights: string[];
+  objects: string[];
   variants: SceneVariant[];
   warnings: SceneWarning[];
   import_options: ImportOptions;

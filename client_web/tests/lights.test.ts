@@ -30,7 +30,14 @@ const camera = projectionCameraOf({
 });
 const close = (a: readonly number[], b: readonly number[]) =>
   a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));
-const common = { intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1] } as const;
+const common = {
+  intensity: 1,
+  color: [1, 1, 1],
+  enabled: true,
+  emission: [1, 1, 1],
+  link: null,
+  shadow_link: null,
+} as const;
 const spot = {
   kind: "spot",
   ...common,

@@ -42,7 +42,12 @@ _UP = np.array([[0, 1, 0]], np.float32)
 
 def omitted_from_glb(export: ExportDocument) -> tuple[str, ...]:
     """Sentences about what a GLB file does not have."""
-    return (f"The environment {export.look.environment.map or export.scene.environment.name} is not part of the file.",)
+    environment = export.look.environment.map or export.scene.environment.name
+    is_linked = any(light.link or light.shadow_link for _, light in export.lights())
+    return (
+        f"The environment {environment} is not part of the file.",
+        *(["Lights light all objects in the file, and all cast shadows: glTF has no links."] if is_linked else []),
+    )
 
 
 def write_glb(export: ExportDocument, path: Path) -> None:

@@ -27,7 +27,7 @@ def omitted_from_light_mix(export: ExportDocument) -> tuple[str, ...]:
     moved = {name for name in lights.keys() - added if lights[name].geometry != scene_lights[name].geometry}
     sentences = {
         f"Lights that the look adds have their values, but not their places: {names_text(added)}.": bool(added),
-        f"Position, shape and image of these lights stay those of the scene: {names_text(moved)}.": bool(moved),
+        f"Position, shape, image and links of these lights stay those of the scene: {names_text(moved)}.": bool(moved),
         "A light mix has the lights of one look; further looks are left out.": bool(export.variants),
     }
     return tuple(sentence for sentence, applies in sentences.items() if applies)

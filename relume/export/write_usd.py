@@ -17,6 +17,7 @@ from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial
 from relume.export.light_frames import light_frame
 from relume.export.open_pbr_inputs import IMAGE_FOLDER, omitted_from_open_pbr
+from relume.export.usd_light_links import write_links
 from relume.export.usd_materials import UsdMaterials, omitted_from_preview
 from relume.image_io.write_image import write_image
 from relume.look.model import LightLook, RectangleLook
@@ -97,10 +98,11 @@ class _StageWriter:
             UsdGeom.Scope.Define(stage, f"{_ROOT}/{group}")
         defined = {id(m): self._materials.define(self._path("Materials", m.name), m) for m in export.all_materials()}
         meshes = [self._mesh(mesh) for mesh in export.scene.meshes]
+        mesh_paths = [mesh.GetPath() for mesh in meshes]
         self._bind(root.GetPrim(), meshes, defined)
         for name, light in export.lights():
-            self._light(name, light)
-        self._dome()
+            write_links(self._light(name, light), light.link, light.shadow_link, export.scene, mesh_paths)
+        self._dome(mesh_paths)
         for camera in export.scene.cameras:
             self._camera(camera)
         return list(self._materials.files)
@@ -157,7 +159,7 @@ class _StageWriter:
             primvar.Set(Vt.Vec2fArray.FromNumpy(coordinates))
         return prim.GetPrim()
 
-    def _light(self, name: str, light: LightLook) -> None:
+    def _light(self, name: str, light: LightLook) -> Any:
         from pxr import UsdLux
 
         path, strength = self._path("Lights", name), max(light.gain)
@@ -184,9 +186,10 @@ class _StageWriter:
         prim.CreateIntensityAttr(strength)
         prim.CreateColorAttr(color)
         _transform(prim, light_frame(light))
+        return prim
 
-    def _dome(self) -> None:
-        """The environment, as an image."""
+    def _dome(self, mesh_paths: list[Any]) -> None:
+        """The environment, as an image. mesh_paths: path of each mesh"""
         from pxr import UsdLux
 
         look = self._export.look.environment
@@ -197,6 +200,7 @@ class _StageWriter:
         write_image(self._folder / IMAGE_FOLDER / "environment.exr", environment.radiance)
         dome = UsdLux.DomeLight.Define(self._stage, self._path("Lights", "environment"))
         dome.GetPrim().SetDisplayName(environment.name)
+        write_links(dome, look.link, None, self._export.scene, mesh_paths)
         dome.CreateTextureFileAttr(f"./{IMAGE_FOLDER}/environment.exr")
         dome.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
         dome.CreateIntensityAttr(look.intensity)

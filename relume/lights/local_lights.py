@@ -135,7 +135,9 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
 
 def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
     """Reduce a light to the geometry of its shadows: a spot casts those of a point light."""
-    return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
+    if geometry.kind != "spot":
+        return geometry
+    return LightGeometry("point", geometry.position, link=geometry.link, shadow_link=geometry.shadow_link)
 
 
 def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple[F64, F64]:

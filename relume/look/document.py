@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, get_args
 
 from relume.assets.environments.environment_names import environment_exists, environment_names
@@ -22,6 +22,7 @@ from relume.image_io.ocio.view import MAX_NAME
 from relume.look.glass import complete_glass, default_glass
 from relume.look.light_mix import expand_light_mix
 from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
+from relume.look.link_validation import check_link
 from relume.look.model import BackgroundKind, BasisFunctions, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
 
@@ -35,7 +36,7 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number in a fie
     "display": {"exposure": (-20.0, 20.0)},
 }
 DEFAULTS: dict[str, dict[str, Any]] = {
-    "environment": {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
+    "environment": {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0, "link": None},
     "background": {"kind": "map", "color": [0.5, 0.5, 0.5], "blur": 10.0},
     "transport": {"show": "all", "bounces": MAX_BOUNCES},
     "display": {"exposure": 0.0, "tone_map": "agx"},
@@ -100,7 +101,7 @@ def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping
     return {
         "materials": _complete_materials(partial.get("materials", {}), default["materials"], previous["materials"]),
         "environment": _complete_environment(
-            partial.get("environment", {}), default["environment"], previous["environment"]
+            partial.get("environment", {}), default["environment"], previous["environment"], default["materials"]
         ),
         "background": _complete_background(partial.get("background", {}), default.get("background", {})),
         "lights": complete_lights(
@@ -176,14 +177,18 @@ def _complete_terms(pointer: Pointer, partial: Any, previous: Sequence[Any]) -> 
     return terms
 
 
-def _complete_environment(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
-    fields = _merge(("environment",), partial, {**DEFAULTS["environment"], **default})  # older stores have no map
+def _complete_environment(
+    partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any], material_names: Collection[str]
+) -> dict[str, Any]:
+    # older stores have no map and no link
+    fields = _merge(("environment",), partial, {**DEFAULTS["environment"], **default})
     if fields["map"] != previous.get("map"):
         _check_map(("environment", "map"), fields["map"])
     ranges = RANGES["environment"]
     check_number(("environment", "intensity"), fields["intensity"], *ranges["intensity"])
     check_triple(("environment", "color"), fields["color"], *ranges["color"])
     check_number(("environment", "rotation"), fields["rotation"], *ranges["rotation"])
+    check_link(("environment", "link"), fields["link"], material_names)
     return fields
 
 

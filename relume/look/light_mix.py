@@ -1,4 +1,4 @@
-"""Light mixes: brightness and color of lights by name, without materials, positions and shapes.
+"""Light mixes: brightness and color of lights by name, without materials, positions, shapes and links.
 
 `lights` and `environment` of a light mix are a partial look.
 """
@@ -34,7 +34,7 @@ def make_light_mix(look: Look, scene_name: str) -> dict[str, Any]:
         "units": UNITS,
         "kinds": {name: light.kind for name, light in look.lights.items()},
         "lights": {name: light.model_dump(mode="json", include=_FIELDS) for name, light in look.lights.items()},
-        "environment": look.environment.model_dump(mode="json"),
+        "environment": look.environment.model_dump(mode="json", exclude={"link"}),
     }
 
 

@@ -16,6 +16,7 @@ from relume.core.validation import (
     invalid_value,
     names_text,
 )
+from relume.look.link_validation import check_link
 from relume.scene.model import Light
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
 
@@ -33,7 +34,14 @@ LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; m
 }
 
 _WHITE = (1.0, 1.0, 1.0)
-_COMMON_DEFAULTS: dict[str, Any] = {"intensity": 1.0, "color": list(_WHITE), "enabled": True, "emission": list(_WHITE)}
+_COMMON_DEFAULTS: dict[str, Any] = {
+    "intensity": 1.0,
+    "color": list(_WHITE),
+    "enabled": True,
+    "emission": list(_WHITE),
+    "link": None,
+    "shadow_link": None,
+}
 _POSITION = {"position": [0.0, 1.0, 0.0]}
 _DIRECTION = {"direction": [0.0, -1.0, 0.0]}
 _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
@@ -56,6 +64,7 @@ def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> di
         documents[light.name] = _merge(pointer, light.fields, default_light(kind))
         if kind == "mesh" and documents[light.name]["material"] not in material_names:
             raise invalid_value((*pointer, "material"), documents[light.name]["material"], names_text(material_names))
+        _check_links(light.name, documents[light.name], material_names)
     return documents
 
 
@@ -77,10 +86,18 @@ def complete_lights(
         value = Description(f"an object with {len(names)} lights")
         raise invalid_value(pointer, value, f"at most {MAX_LIGHTS} lights, including the scene's own")
     lights = {name: _complete_light(name, partial, default.get(name), previous.get(name)) for name in names}
+    for name, light in lights.items():
+        if light is not previous.get(name):
+            _check_links(name, light, material_names)
     _check_materials(
         {name: light for name, light in lights.items() if light["kind"] == "mesh"}, default, material_names
     )
     return lights
+
+
+def _check_links(name: str, light: Mapping[str, Any], material_names: Collection[str]) -> None:
+    for field in ("link", "shadow_link"):
+        check_link(("lights", name, field), light.get(field), material_names)  # older stores have no links
 
 
 def _check_materials(

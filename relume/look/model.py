@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple, NotRequired
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic.dataclasses import dataclass
 from typing_extensions import TypedDict  # pydantic requires it before Python 3.12
 
 from relume.brdf.texture_slots import NormalMap
@@ -99,15 +100,51 @@ class MaterialLook(_FrozenModel):
         return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale)
 
 
+Names = Annotated[tuple[str, ...], AfterValidator(lambda names: tuple(sorted(set(names))))]
+"""A set of names: equal sets are equal keys of a cache."""
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class SurfaceNames:
+    """Surfaces by name: all of some materials, and all of some objects. Objects are the meshes of the scene."""
+
+    materials: Names = ()
+    objects: Names = ()
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class IncludeLink:
+    """Only these surfaces."""
+
+    include: SurfaceNames
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class ExcludeLink:
+    """All surfaces but these."""
+
+    exclude: SurfaceNames
+
+
+Link = IncludeLink | ExcludeLink
+"""Surfaces that a light lights, or that cast its shadows. Dataclasses, since links are parts of keys."""
+
+
 class EnvironmentKey(NamedTuple):
     """Everything that images depend on linearly through the environment, except brightness and tint.
 
     Attributes:
-        map: as in `EnvironmentLook`. rotation: degrees in [0, 360).
+        map: as in `EnvironmentLook`. rotation: degrees in [0, 360). link: as in `EnvironmentLook`.
     """
 
     map: str | None
     rotation: float
+    link: Link | None = None
+
+    @property
+    def unlinked(self) -> EnvironmentKey:
+        """The environment that lights all surfaces."""
+        return self._replace(link=None)
 
 
 BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
@@ -115,17 +152,19 @@ BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
 
 class EnvironmentLook(_FrozenModel):
     """The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counterclockwise
-    from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
+    from above. `map` names it, see `relume.assets.environments`; None: the scene's own. `link`: the surfaces that it
+    lights; None: all."""
 
     map: str | None
     intensity: float
     color: Rgb
     rotation: float
+    link: Link | None = None
 
     @property
     def key(self) -> EnvironmentKey:
-        """Map and rotation, without brightness."""
-        return EnvironmentKey(self.map, self.rotation % 360)
+        """Map, rotation and link, without brightness."""
+        return EnvironmentKey(self.map, self.rotation % 360, self.link)
 
     @property
     def gain(self) -> Rgb:
@@ -148,15 +187,22 @@ class LightGeometry(NamedTuple):
     material: str = ""
     image: str | None = None
     channel: int | None = None
+    link: Link | None = None
+    shadow_link: Link | None = None
 
 
 class _LightLook(_FrozenModel):
-    """Common fields of all lights; the unit of `emission` depends on the kind."""
+    """Common fields of all lights; the unit of `emission` depends on the kind.
+
+    `link`: the surfaces that the light lights; `shadow_link`: those that cast its shadows. None: all.
+    """
 
     intensity: float
     color: Rgb
     enabled: bool
     emission: Rgb
+    link: Link | None = None
+    shadow_link: Link | None = None
 
     @property
     def gain(self) -> Rgb:

@@ -145,6 +145,7 @@ class SampledViews:
             "num_lights": recipe.num_lights,
             "relightable": recipe.relightable,
             "materials": [material.name for material in scene.materials],
+            "objects": [mesh.name for mesh in scene.meshes],
             "double_sided": [material.double_sided for material in scene.materials],
             "has_alpha_test": any(material.is_alpha_tested for material in scene.materials),
             "has_layers": has_layers(scene.materials),

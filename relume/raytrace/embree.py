@@ -94,7 +94,7 @@ _ARGUMENTS = np.zeros((2, 5), np.uint64)
 _ARGUMENTS.view(np.uint32)[:, :2] = (0, _FEATURE_TRIANGLE), (_COHERENT, _FEATURE_TRIANGLE)
 
 
-_OMITTED_VERTEX = 0xFFFFFFFF  # an invalid index: Embree skips the triangle, and the others keep their indices
+OMITTED_VERTEX = np.uint32(0xFFFFFFFF)  # an invalid index: Embree skips the triangle, the others keep their indices
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,8 @@ class EmbreeScene:
             _attach(scene, positions, faces)
         else:
             is_alpha_tested = alpha_test.image[:, None] >= 0
-            _attach(scene, positions, np.where(is_alpha_tested, np.uint32(_OMITTED_VERTEX), faces))
-            _attach(scene, positions, np.where(is_alpha_tested, faces, np.uint32(_OMITTED_VERTEX)), alpha_test)
+            _attach(scene, positions, np.where(is_alpha_tested, OMITTED_VERTEX, faces))
+            _attach(scene, positions, np.where(is_alpha_tested, faces, OMITTED_VERTEX), alpha_test)
         _commit_scene(scene)
         if error := _device_error(_device):
             raise SceneError(f"Embree could not build the scene (error {error}); check it for broken triangles")

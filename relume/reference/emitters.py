@@ -18,6 +18,7 @@ from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.raytrace.texture import MipMap
+from relume.reference.links import lit_meshes, shadow_casters
 from relume.scene.model import Scene, Texture
 
 F32 = NDArray[np.float32]
@@ -43,6 +44,7 @@ class ReferenceEmitter:
     Attributes:
         triangles: triangles of a mesh light. is_two_sided: emits to both sides.
         uvs: texture coordinates of their corners. image: emission relative to its mean; None if uniform.
+        casters: the triangles that cast its shadows. lit_meshes: those that it lights; None: all.
     """
 
     look: LightLook
@@ -50,10 +52,11 @@ class ReferenceEmitter:
     is_two_sided: bool
     uvs: Shaped[F64, "T 3 2"]
     image: Texture | None
+    casters: SceneBuffers
+    lit_meshes: Sequence[bool] | None
 
     def sample(
         self,
-        geometry: SceneBuffers,
         position: Shaped[F64, "n 3"],
         num: int,
         rng: np.random.Generator,
@@ -62,7 +65,6 @@ class ReferenceEmitter:
         """Sample the light at points: random positions on its surface, or its only position.
 
         Args:
-            geometry: the occluding triangles.
             position: positions of the points, meters.
             num: number of samples per point.
             rng: random number generator.
@@ -75,7 +77,7 @@ class ReferenceEmitter:
         flat = direction.reshape(-1, 3).astype(np.float32)
         start = np.repeat(position, direction.shape[1], axis=0).astype(np.float32)
         ray_alpha_sample = alpha_sample if len(alpha_sample) == 1 else np.repeat(alpha_sample, direction.shape[1])
-        ray_length = hit_distance(geometry, start, flat, ray_alpha_sample).reshape(distance.shape)
+        ray_length = hit_distance(self.casters, start, flat, ray_alpha_sample).reshape(distance.shape)
         largest = np.abs(position[:, None] + to_light).max(axis=2)
         is_visible = ray_length > distance - _DISTANCE_SLACK * distance - _POSITION_SLACK * largest
         return LocalLightSamples(direction, factor * is_visible[..., None] * np.array(self.look.gain))
@@ -109,8 +111,8 @@ class ReferenceEmitter:
         return to_light, (area * facing / distance_squared / light_position.shape[1])[..., None]
 
 
-def emitters(scene: Scene, look: Look) -> list[ReferenceEmitter]:
-    """Collect the local lights of a look that emit light."""
+def emitters(scene: Scene, geometry: SceneBuffers, look: Look) -> list[ReferenceEmitter]:
+    """Collect the local lights of a look that emit light. geometry: triangles of the scene"""
     local_lights = []
     for light in look.lights.values():
         triangles, uvs, is_two_sided, image = np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), False, None
@@ -123,7 +125,8 @@ def emitters(scene: Scene, look: Look) -> list[ReferenceEmitter]:
             image = scene.materials[material].textures.get("emission")
         is_dark = isinstance(light, MeshLook) and not _areas(triangles).any()
         if any(light.gain) and not is_dark:
-            local_lights.append(ReferenceEmitter(light, triangles, is_two_sided, uvs, image))
+            casters, lit = shadow_casters(scene, geometry, light.shadow_link), lit_meshes(scene, light.link)
+            local_lights.append(ReferenceEmitter(light, triangles, is_two_sided, uvs, image, casters, lit))
     return local_lights
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,7 @@ class EnvironmentSamples:
         map: the environment's radiance.
         rotation: rotation of the map about +Y, degrees. gain: factor of each channel.
         luminance: total luminance times solid angle, before the gain.
+        lit_meshes: the meshes that the environment lights; None: all.
     """
 
     direction: Shaped[F64, "m 3"]
@@ -38,6 +40,7 @@ class EnvironmentSamples:
     rotation: float
     gain: tuple[float, float, float]
     luminance: float
+    lit_meshes: Sequence[bool] | None = None
 
     @property
     def num_texels(self) -> int:

@@ -7,7 +7,7 @@ by the paths that the method omits.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Shaped
@@ -26,6 +26,7 @@ from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.reference.emitters import ReferenceEmitter, emitted_radiance, emitters
 from relume.reference.environment_samples import EnvironmentSamples, environment_texels
+from relume.reference.links import lit_meshes
 from relume.reference.path_tracing import reference_indirect
 from relume.reference.paths import omitted_paths, unlimited_paths, unsupported_paths
 from relume.reference.radiance import ReferencePoints, reference_radiance
@@ -195,9 +196,10 @@ def _prepare_view(scene: Scene, view: str, look: Look, size: tuple[int, int]) ->
     samples = sample_view(scene, geometry, view, size, traces_mirrors=False, by_channel=True)
     light = scene.environment if look.environment.map is None else load_environment(look.environment.map)
     texels = environment_texels(light, look.environment.rotation).scaled(look.environment.gain)
+    texels = replace(texels, lit_meshes=lit_meshes(scene, look.environment.link))
     look_args = scene, look, samples.surface, samples.material
     points = points_of_samples(samples, surface_textures(*look_args), surface_roughness(*look_args))
-    return _ViewSetup(scene, geometry, look, samples, points, light, texels, emitters(scene, look))
+    return _ViewSetup(scene, geometry, look, samples, points, light, texels, emitters(scene, geometry, look))
 
 
 def _add_direct(radiance: F64, setup: _ViewSetup, draw: _Draw, progress: Callable[[float], object]) -> None:

@@ -83,7 +83,7 @@ def reference_indirect(
         seed: seed of the paths; other seeds are independent.
     Cost: O(n · num_paths · bounces · spp) shadow rays, with the maximum number of bounces of all selections.
     """
-    classes, local_lights = roughness_classes(scene, look), emitters(scene, look)
+    classes, local_lights = roughness_classes(scene, look), emitters(scene, geometry, look)
     lobes = [material_lobes(class_terms) for class_terms in classes.terms]
     total, sum_squares = np.zeros((2, len(light_paths), points.num_points, 3))
     first_classes = classes.classify(np.asarray(material), points)

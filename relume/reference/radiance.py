@@ -27,6 +27,7 @@ from relume.reference.btf_surfaces import BtfSurface, sample_btf_surface
 from relume.reference.emitters import LocalLightSamples, ReferenceEmitter, hit_distance
 from relume.reference.environment_samples import EnvironmentSamples
 from relume.reference.kernel import add_lights, list_visible
+from relume.reference.links import lit_points
 from relume.reference.lobes import Lobe, cosine_lobe, curve_lobe
 
 F32 = NDArray[np.float32]
@@ -180,11 +181,10 @@ def reference_radiance(
     def packet(start: int, stop: int) -> None:
         packet_points = points.samples_of(slice(start, stop))
         packet_tables = _with_btf_surfaces(tables, packet_points, np.random.default_rng((_SEED, pass_index, start, 2)))
+        from_environment = np.zeros((len(materials), stop - start, 3))
         if lobes:
             rng = np.random.default_rng((_SEED, pass_index, start))
-            _add_environment_samples(
-                geometry, texels, spp, lobes, packet_points, packet_tables, rng, radiance[:, start:stop]
-            )
+            _add_environment_samples(geometry, texels, spp, lobes, packet_points, packet_tables, rng, from_environment)
         for first in range(0, 0 if lobes else texels.num_texels, _TEXELS_PER_BATCH):
             rows = slice(first, first + _TEXELS_PER_BATCH)
             _add_texels(
@@ -193,12 +193,15 @@ def reference_radiance(
                 texels.power[rows],
                 packet_points,
                 packet_tables,
-                radiance[:, start:stop],
+                from_environment,
             )
+        frame = packet_points.position, packet_points.normal
+        radiance[:, start:stop] += from_environment * lit_points(geometry, *frame, texels.lit_meshes)[:, None]
         rng = np.random.default_rng((_SEED, pass_index, start, 1))
         for local_light in local_lights:
             position, num = packet_points.position.astype(np.float64), spp or _MAX_LIGHT_SAMPLES
-            light_samples = local_light.sample(geometry, position, num, rng, packet_points.alpha_sample)
+            light_samples = local_light.sample(position, num, rng, packet_points.alpha_sample)
+            light_samples.power[~lit_points(geometry, *frame, local_light.lit_meshes)] = 0
             _add_light_samples(light_samples, packet_points, packet_tables, radiance[:, start:stop])
 
     parallel_for_cancellable(packet, points.num_points, _POINTS_PER_PACKET, progress, is_canceled, "the reference")

@@ -54,6 +54,7 @@ class LobePaths(NamedTuple):
             `TRANSMISSION` if through glass alone; or `REFLECTION`, stored for lobes with a blur, which the brightest
             parts of the environment light directly.
         patch: patch of the end or reflection, `NO_PATCH` for none. lobe: row in `LobeSurfaces` of the newest lobe.
+        face: triangle of that lobe, −1 before any.
         texture: at the end, see `relume.transport.hit_textures`.
         emitter: material of the end if it may emit light to this side after a reflection, else `NO_EMITTER`: the
             samples of local lights are the light before any. emission: its image there, packed.
@@ -68,6 +69,7 @@ class LobePaths(NamedTuple):
     kind: Shaped[NDArray[np.uint8], " K"]
     patch: Shaped[NDArray[np.uint16], " K"]
     lobe: Shaped[NDArray[np.uint8], " K"]
+    face: Shaped[NDArray[np.int32], " K"]
     texture: Shaped[NDArray[np.uint32], "K slots"]
     emitter: Shaped[NDArray[np.uint16], " K"]
     emission: Shaped[NDArray[np.uint32], " K"]
@@ -90,8 +92,10 @@ class LobePaths(NamedTuple):
         vectors = np.empty((3, num_entries, 3), np.float32)
         texture, emission = np.empty((num_entries, num_slots), np.uint32), np.empty(num_entries, np.uint32)
         first, spread = np.zeros(num_points + 1, np.int64), np.empty(num_entries, np.float32)
-        throughput, direction, normal = vectors
-        return cls(first, ray, kind, patch, lobe, texture, emitter, emission, throughput, direction, normal, spread)
+        face, (throughput, direction, normal) = np.empty(num_entries, np.int32), vectors
+        return cls(
+            first, ray, kind, patch, lobe, face, texture, emitter, emission, throughput, direction, normal, spread
+        )
 
     def rows(self, rows: Shaped[NDArray[np.integer], " m"]) -> LobePaths:
         """Select the paths of some points."""
@@ -265,7 +269,7 @@ def _transmit(packet, k, material, face_normal, surfaces, throughput):  # type: 
 def _store(paths, entry, point, ray, kind, patch, lanes, k, direction):  # type: ignore[no-untyped-def]
     """Write an entry of paths, with the point in `first`; the rest is that of lane k."""
     paths.first[entry], paths.ray[entry], paths.kind[entry], paths.patch[entry] = point, ray, kind, patch
-    paths.lobe[entry], paths.spread[entry] = lanes.lobe[k], lanes.angle[k]
+    paths.lobe[entry], paths.face[entry], paths.spread[entry] = lanes.lobe[k], lanes.face[k], lanes.angle[k]
     is_lit = kind == END and lanes.lobe[k] >= 0
     paths.emitter[entry], paths.emission[entry] = lanes.emitter[k] if is_lit else NO_EMITTER, lanes.emission[k]
     for row in range(paths.texture.shape[1]):
@@ -336,7 +340,7 @@ def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, 
     """
     last, lobes, throughput, has_escaped = lanes.last, lanes.lobe, lanes.throughput, lanes.has_escaped
     for k in range(LANES):
-        lobes[k], has_escaped[k], last[k] = -1, False, lanes.patches[k]
+        lobes[k], lanes.face[k], has_escaped[k], last[k] = -1, -1, False, lanes.patches[k]
         lanes.num_reflections[k], lanes.is_path[k], lanes.angle[k] = 0, False, lanes.spread[k]
         throughput[0, k] = throughput[1, k] = throughput[2, k] = _ONE
     for _ in range(MAX_REFLECTIONS + _MAX_SIDES):
@@ -361,6 +365,7 @@ def follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, 
                 random = ray_jitter(ray + lanes.num_reflections[k] * num_rays, lanes.seeds[k])
                 goes_on = _reflect(packet, k, lobe, random, lookup.normals, surfaces, throughput, lanes.normal)
                 lobes[k], last[k], lanes.is_path[k], lanes.emitter[k] = lobe, NO_PATCH, True, NO_EMITTER
+                lanes.face[k] = face
                 if surfaces.blur[lobe] > 0 and k < width:
                     _store(paths, end, first + k, ray, REFLECTION, patch, lanes, k, view)
                     end += 1

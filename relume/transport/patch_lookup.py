@@ -50,7 +50,8 @@ class RayLanes(NamedTuple):
 
     Attributes:
         seeds: of the points. keys: position and normal of each hit, moved within about a patch. roots: of its side.
-        patches: of the newest hits. last: patch of each path's end. lobe: its newest lobe, −1 before one is met.
+        patches: of the newest hits. last: patch of each path's end. lobe: its newest lobe, −1 before one is met;
+            face: its triangle.
         throughput: as in `LobePaths`. normal: of the newest reflection. has_escaped: whether the ray left the scene.
         num_reflections: so far. is_path: whether the ray went on from its first hit.
         spread: width of a ray's footprint by the length of its path. distance: this length, meters.
@@ -65,6 +66,7 @@ class RayLanes(NamedTuple):
     patches: Shaped[NDArray[np.int32], " lanes"]
     last: Shaped[NDArray[np.int32], " lanes"]
     lobe: Shaped[NDArray[np.int32], " lanes"]
+    face: Shaped[NDArray[np.int32], " lanes"]
     throughput: Shaped[F32, "3 lanes"]
     normal: Shaped[F32, "3 lanes"]
     has_escaped: Shaped[NDArray[np.bool_], " lanes"]
@@ -84,7 +86,7 @@ def allocate_lanes():  # type: ignore[no-untyped-def]
     """Allocate `RayLanes`."""
     return RayLanes(
         np.zeros(LANES, np.uint32), np.zeros((6, LANES), np.float32), np.zeros(LANES, np.int32),
-        np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros(LANES, np.int32),
+        np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros(LANES, np.int32), np.zeros(LANES, np.int32),
         np.zeros((3, LANES), np.float32), np.zeros((3, LANES), np.float32), np.zeros(LANES, np.bool_),
         np.zeros(LANES, np.int32), np.zeros(LANES, np.bool_), np.zeros(LANES, np.float32), np.zeros(LANES, np.float32),
         np.zeros(LANES, np.float32), np.zeros((_MAX_SLOTS, LANES), np.uint32), np.zeros(3, np.float32),

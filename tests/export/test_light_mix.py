@@ -94,7 +94,7 @@ def test_the_report_says_what_a_mix_does_not_restore() -> None:
     report = export_report(export, FORMATS["light_mix"])
     assert report.omitted == (
         "Lights that the look adds have their values, but not their places: 'Kicker'.",
-        f"Position, shape and image of these lights stay those of the scene: {name!r}.",
+        f"Position, shape, image and links of these lights stay those of the scene: {name!r}.",
         "A light mix has the lights of one look; further looks are left out.",
     )
     assert format_of(Path("a.JSON")) is FORMATS["light_mix"]

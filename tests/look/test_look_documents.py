@@ -21,8 +21,10 @@ def test_default_look_has_every_field(default):
         "curves": {},
     }
     assert default["materials"]["a/b~c"]["terms"][0]["texture"] is None
-    assert default["environment"] == {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
-    plain = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True}
+    assert default["environment"] == {
+        "map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0, "link": None,
+    }  # fmt: skip
+    plain = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "link": None, "shadow_link": None}
     spot = {"kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -1.0, 0.0], "cone": [20.0, 30.0]}
     panel = {"kind": "mesh", "material": "Teapot", "image": None, "emission": [5.0, 5.0, 4.0]}
     assert default["lights"] == {"Key": {**plain, **spot, "emission": [1.0, 1.0, 1.0]}, "Panel": {**plain, **panel}}
@@ -88,6 +90,7 @@ def test_lights_are_added_completed_and_removed(default):
     assert added["lights"]["Lamp"] == {
         "kind": "rectangle", "intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "emission": [1.0, 1.0, 1.0],
         "position": [0.0, 1.0, 0.0], "direction": [0.0, -1.0, 0.0], "rotation": 0.0, "size": [1, 2],
+        "link": None, "shadow_link": None,
     }  # fmt: skip
     moved = apply_patch(added, replace("/lights/Lamp/position/1", 1.5), default)
     assert moved["lights"]["Lamp"]["position"] == [0.0, 1.5, 0.0]

@@ -105,7 +105,7 @@ def test_empty_path_replaces_the_whole_look(default):
     edited = apply_patch(default, replace("/display/exposure", 3), default)
     assert apply_patch(edited, replace("", {}), default) == default
     whole = apply_patch(default, replace("", {"environment": {"intensity": 2}}), default)
-    assert whole["environment"] == {"map": None, "intensity": 2, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+    assert whole["environment"] == default["environment"] | {"intensity": 2}
 
 
 def test_term_may_be_added_moved_down_and_changed_in_model(default):

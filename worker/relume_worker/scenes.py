@@ -28,6 +28,8 @@ from relume_worker.paths import bake_path, scene_path, staging_path
 from relume_worker.run_marker import delete_run
 from relume_worker.storage import delete_remote, push
 
+MAX_LISTED_OBJECTS = 2000
+
 
 @dataclass(frozen=True)
 class SceneRecord:
@@ -40,6 +42,7 @@ class SceneRecord:
             old ones lack the last three.
         variants: partial looks of the file, by name.
         lights: names of the scene's lights.
+        objects: names of its meshes; empty if there are more than `MAX_LISTED_OBJECTS`, and in old rows.
         import_options: `relume.scene_io.import_options.ImportOptions` other than the defaults.
         size: sides of the bounding box without a shadow catcher, meters; None in old rows.
     """
@@ -53,6 +56,7 @@ class SceneRecord:
     num_triangles: int
     variants: dict[str, dict[str, Any]]
     lights: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
     aspects: tuple[float | None, ...] = ()
     import_options: Mapping[str, str] = field(default_factory=dict)
     size: tuple[float, float, float] | None = None
@@ -92,6 +96,7 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
+        "objects": [mesh.name for mesh in scene.meshes] if len(scene.meshes) <= MAX_LISTED_OBJECTS else [],
         "import_options": scene.import_options,
         "size": _size(scene),
     }
@@ -219,6 +224,7 @@ def _record(row: SceneRow) -> SceneRecord:
         num_triangles=summary["num_triangles"],
         variants=summary.get("variants", {}),  # rows from before this field
         lights=tuple(summary.get("lights", ())),
+        objects=tuple(summary.get("objects", ())),
         aspects=tuple(summary.get("aspects", ())),
         import_options=summary.get("import_options", {}),
         size=summary.get("size"),

@@ -77,7 +77,7 @@ class Background:
         """
         background = look.background
         factor = tuple(1 / gain) if background.kind == "color" else light.environment_gain
-        emitter_radiance = self._images.mirrors.mirror_emitters(light)
+        emitter_radiance = self._images.mirrors.mirror_emitters(light, self._images.transfer.local)
         state = _BackgroundState(background, light.environment, factor, light.paths.direct, lit_rectangles(light))
         for name, material in self._images.by_name.items():
             if material.num_samples and look.materials[name].shadow_catcher:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from relume.brdf.albedo import Reflectance, Reflectances, material_reflectance
 from relume.brdf.texture_slots import EmissionImage, NormalMap
 from relume.look import EnvironmentKey, LightGeometry, LightPaths, Look
-from relume.look.model import Rgb
+from relume.look.model import Link, Rgb
 
 ENVIRONMENT = "environment"  # name of the environment among the names of sources
 
@@ -131,6 +131,16 @@ def element_gain_changes(before: Illumination, after: Illumination) -> Mapping[I
     return MappingProxyType({element: gain for element, gain in change.items() if any(gain)})
 
 
+def unlinked(element: Illumination) -> tuple[Illumination, Link | None]:
+    """Return the direct light of one source as if it lit all surfaces, and its link; indirect light is unchanged."""
+    if not element.paths.direct:
+        return element, None
+    if not element.local:
+        return element._replace(environment=element.environment.unlinked), element.environment.link
+    ((geometry, gain),) = element.local
+    return element._replace(local=(LightSource(geometry._replace(link=None), gain),)), geometry.link
+
+
 def direct_only(light: Illumination) -> Illumination:
     """Return the direct component of a light."""
     return light._replace(paths=light.paths.without_reflections(), reflectances=())
@@ -208,6 +218,12 @@ def material_emission(light: Illumination, material: str) -> Rgb:
 def geometries(look: Look) -> Iterator[LightGeometry]:
     """Yield the geometries of a look's lights."""
     return (light.geometry for light in look.lights.values())
+
+
+def links(look: Look) -> list[Link]:
+    """Return the links of all light of a look."""
+    local = [link for light in geometries(look) for link in (light.link, light.shadow_link)]
+    return [link for link in (look.environment.link, *local) if link is not None]
 
 
 def emission_images(

@@ -13,6 +13,7 @@ from relume.brdf.specular_reflectance import specular_terms
 from relume.camera.ray_paths import NO_MIRROR
 from relume.lights.local_lights import rectangle
 from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.live.fixed_camera.protocols import LocalLightTransport
 from relume.views.mirror_samples import MirrorSamples
 from relume.views.view import View
 
@@ -41,14 +42,14 @@ class MirrorFactors:
         self._specular_factors = None if chain is None else np.ones((*chain.material.shape, 3), np.float32)
         self.materials: list[int] = [] if chain is None else np.setdiff1d(chain.material, [NO_MIRROR]).tolist()
 
-    def mirror_emitters(self, light: Illumination) -> Shaped[F32, "3 m"] | None:
+    def mirror_emitters(self, light: Illumination, local: LocalLightTransport) -> Shaped[F32, "3 m"] | None:
         """Return the radiance of rectangles between mirrors and the samples visible in them; None if there are none.
 
-        The same array is returned while nothing changes.
+        The same array is returned while nothing changes. local: knows linked surfaces.
         """
         sources = lit_rectangles(light)
         if self._mirror_samples is not None and sources != self._emitters[0]:
-            self._emitters = sources, _emitter_radiance(self._mirror_samples, sources) if sources else None
+            self._emitters = sources, _emitter_radiance(self._mirror_samples, sources, local) if sources else None
         return self._emitters[1]
 
     def update_emission(self, documents: Mapping[int, Documents | None]) -> list[int]:
@@ -79,7 +80,7 @@ class MirrorFactors:
         return changed
 
 
-def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSource]) -> F32:
+def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSource], local: LocalLightTransport) -> F32:
     """Radiance of rectangles on the ray paths from mirrors to mirrored samples. (3, m)"""
     radiance = np.zeros((3, len(mirror_samples.sample)), np.float32)
     for geometry, gain in sources:
@@ -99,5 +100,6 @@ def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSour
             & (v >= 0)
             & (v <= 1)
         )
+        is_hit &= local.is_lit_behind(geometry.link, mirror_samples.origin, mirror_samples.direction)
         radiance[:, is_hit] += np.array(gain, np.float32)[:, None]
     return radiance

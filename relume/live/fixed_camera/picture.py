@@ -209,7 +209,7 @@ class Picture:
         tiles: set[Tile] = set()
         light, gain = scheduler.light, self._background.clamped_gain(scheduler.gain, self._look.background)
         is_background_new = self._background.update(self._look, light, gain, self._radiance)
-        emitter_radiance = images.mirrors.mirror_emitters(light)
+        emitter_radiance = images.mirrors.mirror_emitters(light, images.transfer.local)
         for index, material in enumerate(images.by_name.values()):
             material.set_mirror_emission(emitter_radiance)
             if material.num_samples and material.compose(self._radiance):

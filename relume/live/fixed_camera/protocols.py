@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeAlias
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
     from relume.look import EnvironmentKey, LightGeometry
     from relume.look.glass import GlassOfLook
+    from relume.look.model import Link
     from relume.operators.image_cache import ImageFiles
     from relume.raytrace.moving_light import MovingLight
     from relume.raytrace.surface_points import SurfacePoints
@@ -160,6 +161,20 @@ class LocalLightTransport(Protocol):
 
     def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
         """Return the image that a light's surfaces emit; None if they emit as in the scene."""
+        ...
+
+    def is_lit_behind(
+        self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
+    ) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for rays that start on a surface that a light with this link lights.
+
+        Args:
+            link: of the light. origins: where the rays start. directions: away from the surface.
+        """
+        ...
+
+    def check_links(self, links: Iterable[Link]) -> None:
+        """Require that the scene has all objects of some links. Raises ParameterError, StoreError."""
         ...
 
 

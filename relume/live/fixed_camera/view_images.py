@@ -26,6 +26,7 @@ from relume.live.fixed_camera.illumination import (
     geometries,
     illumination_from_look,
     is_solo,
+    links,
     material_emission,
     picture_gain,
 )
@@ -246,6 +247,7 @@ class ViewImages:
     def _illumination_from_look(self, look: Look, solo: Solo = None) -> Illumination:
         has_bounces, names = EditAxis.BOUNCES in self.transfer.axes, self.transfer.material_names
         images = emission_images(geometries(look), self.transfer.local.emission_image)
+        self.transfer.local.check_links(links(look))
         return illumination_from_look(look, names, has_bounces=has_bounces, solo=solo, images=images)
 
     def _emission_pattern(self, material: int, image: EmissionImage | None) -> F32:

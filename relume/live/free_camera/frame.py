@@ -402,7 +402,8 @@ def _lobe_visibility(
     if not widths:
         return np.zeros((len(viewed.material), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
     lobe_lights = transfer.lobe_lights(light.environment, widths)
-    return trace_lobe_visibility(viewed, transfer.light_visibility_bits, lobe_lights, lobes, out)
+    visible = transfer.light_visibility_bits(light.environment.link)
+    return trace_lobe_visibility(viewed, visible, lobe_lights, lobes, out)
 
 
 def _highlight_light_sums(transfer: FreeCameraTransfer, state: FrameRequestState, viewed: ViewedProbes) -> F32:
@@ -411,7 +412,7 @@ def _highlight_light_sums(transfer: FreeCameraTransfer, state: FrameRequestState
     if not (lobes.max_ratio == 1).any() or not light.has_direct_environment:
         return np.zeros((len(viewed.material), 3), np.float32)
     lights = transfer.environment_lights(light.environment, is_preview=state.is_coarse)
-    return sum_lights(viewed, transfer.light_visibility_bits, lights, lobes)
+    return sum_lights(viewed, transfer.light_visibility_bits(light.environment.link), lights, lobes)
 
 
 def _add_hard_shadow_lights(

@@ -19,6 +19,7 @@ from relume.live.fixed_camera.illumination import (
     emission_images,
     geometries,
     illumination_from_look,
+    links,
     picture_gain,
 )
 from relume.live.fixed_camera.jobs import Job, Priority
@@ -115,13 +116,15 @@ class FreeCameraPicture:
             look: the target. active_pointer: pointer to the active control, or None.
             solo: names of the only light sources to show, see `illumination_from_look`; None: all.
         Raises:
-            ParameterError: `active_pointer` does not point to an editable control. NotFoundError, SceneError: the
-                environment is not available. The picture is unchanged.
+            ParameterError: `active_pointer` does not point to an editable control, or a light is linked to an object
+                that the scene does not have. NotFoundError, SceneError: the environment is not available. The picture
+                is unchanged.
         """
         if active_pointer is not None:
             parse_pointer(active_pointer)
         names = self._transfer.material_names
         images = emission_images(geometries(look), self._transfer.emission_image)
+        self._transfer.check_links(links(look))
         light = illumination_from_look(look, names, has_bounces=True, solo=solo, images=images)
         self._transfer.environment_map(light.environment.map)  # raises now if it is not available
         self._look, self._light, self._solo = look, light, solo
@@ -338,15 +341,19 @@ class FreeCameraPicture:
     def _trace_shadow_visibility(self, hard_shadow_lights: Sequence[HardShadowLight], gbuffer: GBuffer) -> list[F32]:
         """Return the visibility of each hard-shadow light along camera rays; cached until the camera or light moves."""
         cached = self._shadow_visibility[1] if self._shadow_visibility[0] == self._camera_seq else {}
-        args = self._transfer.occlusion_mesh, gbuffer, self._camera, self._size
         visibility = [
-            cached[b.key] if b.key in cached else visible_fractions(*args, b.targets) for b in hard_shadow_lights
+            cached[light.key] if light.key in cached else self._visible_fractions(light, gbuffer)
+            for light in hard_shadow_lights
         ]
         self._shadow_visibility = (
             self._camera_seq,
             {light.key: fractions for light, fractions in zip(hard_shadow_lights, visibility, strict=True)},
         )
         return visibility
+
+    def _visible_fractions(self, light: HardShadowLight, gbuffer: GBuffer) -> F32:
+        mesh = self._transfer.occlusion_mesh._replace(embree=light.casters)
+        return visible_fractions(mesh, gbuffer, self._camera, self._size, light.targets)
 
     def _request_state(self, look: Look, incident: IncidentCoefficients) -> FrameRequestState:
         gain = np.array(picture_gain(look, self._solo), np.float32)
@@ -395,8 +402,7 @@ class FreeCameraPicture:
         if only_centers:
             gbuffer = gbuffer.pixel_centers(self._size[0] * self._size[1])
         state = self._request_state(self._look, self._current_vectors(gbuffer.is_needed))._replace(is_fine=False)
-        args = self._transfer.occlusion_mesh, gbuffer, self._camera, self._size
-        shadow_visibility = [visible_fractions(*args, light.targets) for light in state.incident.hard_shadow_lights]
+        shadow_visibility = [self._visible_fractions(light, gbuffer) for light in state.incident.hard_shadow_lights]
         return render_frame(self._transfer, state, gbuffer, self._camera, self._size, shadow_visibility).image, gbuffer
 
     def _current_light(self) -> Illumination:

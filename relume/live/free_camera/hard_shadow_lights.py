@@ -14,6 +14,7 @@ from relume.lights.spherical_triangles import TriangleLights
 from relume.lights.sun_disks import NUM_TARGET_SETS, NUM_TARGETS, SunDisk
 from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.look import LightGeometry
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.incident_coefficients import incident_coefficients
 
@@ -42,14 +43,16 @@ class HardShadowLight(NamedTuple):
 
     Attributes:
         key: equal keys cast equal shadows. For a local light it is the geometry.
-        vectors: its unoccluded incident coefficients at probes, gain 1.
+        vectors: its unoccluded incident coefficients at probes that it lights, gain 1.
         gain: per channel.
+        casters: the triangles that cast its shadows.
     """
 
     key: Hashable
     targets: ShadowTargets
     vectors: Shaped[F32, "probes 3 K"]
     gain: Shaped[F32, " 3"]
+    casters: EmbreeScene
 
     def scatter(self, rows: Shaped[NDArray[np.intp], " n"], shape: tuple[int, int, int]) -> HardShadowLight:
         """Return the same light with coefficients of all probes, zero except in `rows`. shape: shape of all

@@ -10,8 +10,8 @@ lights cover a share P of the lobe (`relume.live.free_camera.lobe_coverage`). Ea
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple, Self
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Self
 
 import numba as nb
 import numpy as np
@@ -25,9 +25,10 @@ from relume.lights.local_lights import SURFACE, LocalLight, light_sample, make_e
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.lobe_coverage import lobe_coverage, nearest_point
 from relume.live.free_camera.normal_mapping import normalize
-from relume.look.model import Rgb
+from relume.look.model import Link, Rgb
 from relume.math.fast_math import acos_clamped
 from relume.math.plane_rounding import end_offsets
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.lobe_directions import LobePattern, angle_at_quantile, lobe_density, lobe_direction, ray_jitter
 from relume.raytrace.local_light_visibility import shadow_ray
 from relume.raytrace.ray_packet import (
@@ -375,13 +376,27 @@ def _add_area_light(tracer, points, wo, footprint, pattern, widths, emitter, gai
                 _add_triangle(packet, points, wo, footprint, pattern, widths, emitter, t, gain, first, width, lit, out)
 
 
+class LobeLight(NamedTuple):
+    """A local light of a look in narrow lobes.
+
+    Attributes:
+        emitter: of unit emission. gain: per channel.
+        casters: the triangles that cast its shadows. link: the surfaces that it lights.
+    """
+
+    emitter: LobeEmitter
+    gain: Rgb
+    casters: EmbreeScene
+    link: Link | None
+
+
 def add_direct_lights(
     scene: LobeScene,
     environment: PrefilteredEnvironment,
     receivers: ShadingPoints,
     footprint: Shaped[F32, "#n 2 2 3"],
     pattern: LobePattern,
-    emitters: Sequence[tuple[LobeEmitter, Rgb]],
+    local_lights: Sequence[LobeLight],
     radiance: Shaped[F32, "n 3"],
 ) -> None:
     """Add the direct light of bright lights of the environment, and of local lights.
@@ -389,19 +404,22 @@ def add_direct_lights(
     Args:
         scene: that casts shadows. environment: with the gain of all its light. receivers: the points.
         footprint: of each point, see `relume.transport.lobe_hits.trace_lobe_rays`. pattern: of the whole lobe.
-        emitters: the local lights, with a gain each. radiance: L̄ of each point, added to.
+        local_lights: the local lights. radiance: L̄ of each point, added to.
     """
-    tracer = scene.geometry.embree.shadow_tracer(coherent=True)
-    args = tracer, receivers.points, receivers.wo, footprint, pattern, lobe_widths(pattern)
-    lights = [(each, np.array(gain, np.float32)) for each, gain in emitters]
+    points = receivers.points
+    args = points, receivers.wo, footprint, pattern, lobe_widths(pattern)
 
-    def kernel(start: int, stop: int) -> None:
-        _add_bright_lights(*args, environment, start, stop, radiance)
-        for emitter, gain in lights:
-            add_light = _add_area_light if emitter.light.kind == SURFACE else _add_small_light
-            add_light(*args, emitter, gain, start, stop, radiance)
+    def add_linked(add: Callable[..., None], casters: EmbreeScene, link: Link | None, *light_args: Any) -> None:
+        tracer, out = casters.shadow_tracer(coherent=True), radiance if link is None else np.zeros_like(radiance)
+        parallel_for_chunks(lambda start, stop: add(tracer, *args, *light_args, start, stop, out), points.num_points)
+        if link is not None:
+            scene.links.darken(link, points, out)
+            np.add(radiance, out, out=radiance)
 
-    parallel_for_chunks(kernel, receivers.points.num_points)
+    add_linked(_add_bright_lights, scene.geometry.embree, scene.links.environment, environment)
+    for emitter, gain, casters, link in local_lights:
+        add_light = _add_area_light if emitter.light.kind == SURFACE else _add_small_light
+        add_linked(add_light, casters, link, emitter, np.array(gain, np.float32))
 
 
 def lobe_widths(pattern: LobePattern) -> Shaped[F32, " 2"]:

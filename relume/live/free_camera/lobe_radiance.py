@@ -170,7 +170,9 @@ def mean_lobe_radiance(
     points, wo = receivers.points, receivers.wo
     point_args = points, wo, footprint
     surfaces = scene.surfaces._replace(blur=np.maximum(scene.surfaces.blur, _LEAST_BLUR))
-    hits = trace_lobe_rays(scene.geometry, scene.lookup, surfaces, *point_args, None, core)
+    hits = scene.links.lit_hits(
+        trace_lobe_rays(scene.geometry, scene.lookup, surfaces, *point_args, None, core), points
+    )
     out = np.empty((points.num_points, 3), np.float32)
     light_args = scene.outgoing, scene.textured, scene.emission, surfaces, scene.broad_share
     args = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -18,11 +18,11 @@ from relume.live.free_camera.free_view import FreeView
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
-from relume.live.free_camera.lobe_lights import LobeEmitter
+from relume.live.free_camera.lobe_lights import LobeLight
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import EnvironmentKey, LightGeometry
-from relume.look.model import Rgb
+from relume.look.model import Link
 from relume.probes.stored_scene import StoredScene
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.interior import Obstacle, Surroundings
@@ -86,8 +86,12 @@ class FreeCameraTransfer(OpenBake, Protocol):
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
-    @property
-    def light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
+
+    def check_links(self, links: Iterable[Link]) -> None:
+        """Require that the scene has all objects of some links. Raises ParameterError, StoreError."""
+        ...
+
+    def light_visibility_bits(self, link: Link | None) -> Shaped[NDArray[np.uint8], "probes bytes"]:
         """Visibility of light triangles from probes, in the order of `lobe_lights`: triangle l in bit l & 7 of byte l
         >> 3.
         """
@@ -165,8 +169,8 @@ class FreeCameraTransfer(OpenBake, Protocol):
         """
         ...
 
-    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
-        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+    def local_lobe_lights(self, light: Illumination) -> Sequence[LobeLight]:
+        """Return the local lights as narrow lobes see them. light: the illumination"""
         ...
 
     def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:

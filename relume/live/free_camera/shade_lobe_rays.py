@@ -196,6 +196,6 @@ def _add_lobe(
     receivers = ShadingPoints(points, wo, np.empty((len(rows), 0), np.uint8))
     footprint = pixel_footprint(image.pixel, width, points, wo) if width else NO_FOOTPRINT
     light_args = lobe_scene, environment, receivers, footprint, lobe, image, rays_per_point
-    radiance = lobe_radiance(*light_args, transfer.lobe_emitters(light), is_direct=light.paths.direct)
+    radiance = lobe_radiance(*light_args, transfer.local_lobe_lights(light), is_direct=light.paths.direct)
     args = *scene_args, pixel_angle, lobe.albedo, points, wo, radiance, rows
     parallel_for_chunks(lambda start, stop: _add_lobes(*args, start, stop, out), len(rows))

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.lobe_lights import LobeEmitter, add_direct_lights, lobe_widths, mirror_direction
+from relume.live.free_camera.lobe_lights import LobeLight, add_direct_lights, lobe_widths, mirror_direction
 from relume.live.free_camera.lobe_radiance import mean_lobe_radiance
 from relume.live.free_camera.lobe_terms import TracedLobe
-from relume.look.model import Rgb
 from relume.raytrace.lobe_directions import make_lobe_pattern
 from relume.scene.model import Camera
 from relume.transport.lobe_hits import NO_FOOTPRINT, half_vector_spread
@@ -204,7 +203,7 @@ def lobe_radiance(
     lobe: TracedLobe,
     image: ImagePoints,
     rays_per_point: float,
-    emitters: Sequence[tuple[LobeEmitter, Rgb]],
+    local_lights: Sequence[LobeLight],
     *,
     is_direct: bool,
 ) -> Shaped[F32, "n 3"]:
@@ -213,7 +212,7 @@ def lobe_radiance(
     Args:
         scene, environment, receivers, footprint, is_direct: as in `mean_lobe_radiance`. lobe: of all points.
         image: where the points are. rays_per_point: mean number that time allows.
-        emitters: as in `add_direct_lights`.
+        local_lights: as in `add_direct_lights`.
     """
     num_rays = int(np.clip(rays_per_point, 1, _MOST_RAYS))
     core, pattern = (make_lobe_pattern(sampling, num_rays, _SEED) for sampling in (lobe.core, lobe.sampling))
@@ -226,13 +225,13 @@ def lobe_radiance(
     if is_image:
         radiance = _share_with_neighbors(radiance, rows, image, receivers, footprint, lobe_width)
     if is_direct:
-        add_direct_lights(*light_args, receivers, footprint, pattern, emitters, radiance)
+        add_direct_lights(*light_args, receivers, footprint, pattern, local_lights, radiance)
     if image.source is not None and len(scene.surfaces.normals):
         split = _split_points(scene, receivers, image, image.source, radiance)
         points = ShadingPoints(split.points, split.wo, np.empty((len(split.wo), 0), np.uint8))
         of_points = mean_lobe_radiance(*light_args, points, NO_FOOTPRINT, core, lobe.blur, is_direct=is_direct)
         if is_direct:
-            add_direct_lights(*light_args, points, NO_FOOTPRINT, pattern, emitters, of_points)
+            add_direct_lights(*light_args, points, NO_FOOTPRINT, pattern, local_lights, of_points)
         split.average(of_points, radiance)
     return radiance
 

@@ -19,11 +19,10 @@ from relume.live.fixed_camera.protocols import Samples
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.lobe_lights import LobeEmitter
+from relume.live.free_camera.lobe_lights import LobeLight
 from relume.live.free_camera.lobe_terms import split_terms
 from relume.live.free_camera.shared_lobe_rays import MAX_RAYS, ImagePoints, PixelSource, lobe_radiance
 from relume.live.opened.prefiltered_environments import EnvironmentSource, PrefilteredEnvironments
-from relume.look.model import Rgb
 from relume.transport.lobe_scene import LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.shading_points import ShadingPoints
@@ -45,8 +44,8 @@ class LobeSource(EnvironmentSource, Protocol):
         """
         ...
 
-    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
-        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+    def local_lobe_lights(self, light: Illumination) -> Sequence[LobeLight]:
+        """Return the local lights as narrow lobes see them. light: the illumination"""
         ...
 
 
@@ -93,10 +92,10 @@ class FewLobeRays:
         if traced is None:
             return None
         image = self._image_points(view, material)
-        footprint, emitters = samples.pixel_footprint(receivers), self.light_transport.lobe_emitters(light)
+        footprint, local_lights = samples.pixel_footprint(receivers), self.light_transport.local_lobe_lights(light)
         scene = self.light_transport.lobe_scene(light, lambda: False, self.outgoing)
         light_args = scene, self.environment, receivers, footprint
-        ray_args = traced, image, MAX_RAYS / max(image.num_pixels, 1), emitters
+        ray_args = traced, image, MAX_RAYS / max(image.num_pixels, 1), local_lights
         radiance = lobe_radiance(*light_args, *ray_args, is_direct=light.paths.direct)
         args = receivers.normal, receivers.wo, np.ascontiguousarray(traced.albedo[:, 0])
         parallel_for_chunks(lambda start, stop: _scale_by_albedo(*args, start, stop, radiance), len(radiance))

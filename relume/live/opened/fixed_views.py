@@ -28,9 +28,10 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination, emission_images
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
-from relume.live.free_camera.lobe_lights import LobeEmitter
+from relume.live.free_camera.lobe_lights import LobeLight
 from relume.live.opened.few_lobe_rays import FewLobeRays
 from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.linked_surfaces import LightLinks
 from relume.live.opened.lobe_light import (
     HitImages,
     LobePatches,
@@ -52,7 +53,6 @@ from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete, validate
 from relume.look.glass import GlassOfLook, glass_of
-from relume.look.model import Rgb
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
@@ -159,6 +159,7 @@ class BakedFixedViews:
 
     def environment_lights(self, environment: EnvironmentKey, quality: LightQuality) -> TriangleLights:
         """Return the triangles of an environment: the tiles of the bake with new weights."""
+        environment = environment.unlinked
         if quality is LightQuality.PREVIEW:  # a large map takes seconds
             return self.coarse_weights("lights", environment, self.environment_radiance)
         if quality is LightQuality.MERGED:
@@ -254,7 +255,7 @@ class BakedFixedViews:
     ) -> LightsAndPoints:
         """Return the incident light at samples. See `FixedViewTransfer`."""
         lights = self.direct_lights(light, quality if lobe is None else LightQuality.EXACT)
-        receivers = samples.receivers(is_lit=lights.num_lights > 0)
+        receivers = self._linked(samples.receivers(is_lit=lights.num_lights > 0), light)
         rays: list[RayList] = []
         if lobe is not None:
             lights, receivers = self._share_with_rays(lights.ungrouped(), receivers, light, lobe)
@@ -265,6 +266,15 @@ class BakedFixedViews:
         followed = self._followed_materials(light) if lobe is not None and lobe.is_narrow.all() else ()
         rays += [*self._mirror_rays(samples, light, followed), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
+
+    def _linked(self, receivers: ShadingPoints, light: Illumination) -> ShadingPoints:
+        """Return receivers whose visibility is zero where the environment does not light the surface."""
+        link = light.environment.link
+        if link is None:
+            return receivers
+        visible = receivers.visible.copy()
+        self.local.linked.darken(link, receivers.points, visible)
+        return replace(receivers, visible=visible)
 
     @staticmethod
     def _followed_materials(light: Illumination) -> list[int]:
@@ -305,7 +315,7 @@ class BakedFixedViews:
         outgoing = None if patch_light is None else self._patch_light(patch_light, is_canceled)
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled, outgoing)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
-        environment, peaks = NO_ENVIRONMENT, NO_PEAKS
+        hits, environment, peaks = scene.links.lit_hits(hits, receivers.points), NO_ENVIRONMENT, NO_PEAKS
         if light.has_environment:
             environment, peaks = self._lobe_environment(light, self._shared_triangles(light, lobe))
         light_args = scene.outgoing, scene.textured, environment, scene.broad_share
@@ -333,9 +343,9 @@ class BakedFixedViews:
         """Prepare images of narrow terms by few rays a sample. See `FixedViewTransfer`."""
         return FewLobeRays.prepare(self, light, is_canceled)
 
-    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
-        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
-        return self.local.lobe_emitters(light)
+    def local_lobe_lights(self, light: Illumination) -> Sequence[LobeLight]:
+        """Return the local lights as narrow lobes see them. light: the illumination"""
+        return self.local.local_lobe_lights(light)
 
     def lobe_scene(
         self,
@@ -355,7 +365,8 @@ class BakedFixedViews:
         patch_light = self._patch_light(light, is_canceled) if outgoing is None else outgoing
         light_args = patch_light, self._mesh_emission(light)
         surface_args = reflectances, self._hit_images(light), self._lobe_patches(reflectances)
-        return self.lobe_tracer.scene(*surface_args, *light_args, goes_on=goes_on)
+        links = LightLinks(self.local.linked, light, self.material_names)
+        return self.lobe_tracer.scene(*surface_args, *light_args, links, goes_on=goes_on)
 
     def _hit_images(self, light: Illumination) -> HitImages:
         """Return the images of a look that lobe rays meet."""
@@ -376,7 +387,7 @@ class BakedFixedViews:
 
     def _lobe_environment(self, light: Illumination, shared: NDArray[np.intp]) -> tuple[LobeEnvironment, LobePeaks]:
         """Return the environment for lobe rays. shared: triangles that share their light with them"""
-        key, rotation = light.environment, light.environment.rotation
+        key, rotation = light.environment.unlinked, light.environment.rotation
         radiance, lights = self.environment_map(key.map), self.environment_lights(key, LightQuality.EXACT)
         tile = self.cache.get_value(
             (self.key, "tile of texels", key), lambda: tile_of_texels(self.tiles, radiance.shape[:2], rotation)
@@ -440,7 +451,7 @@ class BakedFixedViews:
     def background_in(self, environment: EnvironmentKey, view: View) -> Shaped[NDArray[np.float32], "n 3"]:
         """Return the radiance of a view's background samples; behind frosted glass, the mean about each ray."""
         directions = view.background_directions()
-        is_baked = environment == BAKED_ENVIRONMENT
+        is_baked = environment.unlinked == BAKED_ENVIRONMENT
         radiance = view.background() if is_baked else self.environment_along(environment, directions)
         for alpha, rows in view.frosted_background():
             turned = rotate_about_y(directions[rows], -environment.rotation).astype(np.float32)

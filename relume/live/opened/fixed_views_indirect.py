@@ -90,7 +90,7 @@ class BakedIndirectViews(BakedFixedViews):
         """Light of planar mirrors in any look."""
         if self.mirror_lights is None:
             return None
-        return MirrorLightTransfer(self.mirror_lights, self.patches, self.environment_lights, self.cache, self.key)
+        return MirrorLightTransfer(self.mirror_lights, self.patches, *self._direct_light_args)
 
     @cached_property
     def tracer(self) -> NormalRetracer:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relume.brdf.texture_slots import EmissionImage
 from relume.core.cache import Cache
 from relume.lights.spherical_triangles import TriangleLights
-from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment
+from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment, unlinked
 from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality
 from relume.live.free_camera.environment_lookup import EnvironmentLookup
@@ -22,7 +22,7 @@ from relume.live.free_camera.free_view import FreeView
 from relume.live.free_camera.hard_shadow_lights import HardShadowLight, hard_shadow_lights, local_shadow_targets
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
-from relume.live.free_camera.lobe_lights import LobeEmitter
+from relume.live.free_camera.lobe_lights import LobeLight
 from relume.live.free_camera.occluded_probes import find_occluded_probes
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.live.free_camera.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
@@ -33,11 +33,12 @@ from relume.live.opened.stored_patches import read_patches
 from relume.live.opened.sun_extraction import SunExtractor
 from relume.look import EnvironmentKey, LightGeometry
 from relume.look.glass import GlassOfLook
-from relume.look.model import Rgb
+from relume.look.model import Link
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
 from relume.methods.mirror_lights import read_mirror_lights
 from relume.methods.store_layout import BakedError, read_free_camera_error
 from relume.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
+from relume.probes.triangle_grids import num_nodes
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.interior import Obstacle, Surroundings, find_surroundings, first_obstacle, interior_camera
@@ -225,6 +226,9 @@ class BakedFreeCamera:
         return self.key, "incident coefficients", element, without_sun_disks and self.sun_disks.are_in(element)
 
     def _vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
+        on_all, link = unlinked(element)
+        if link is not None:
+            return self._darkened(self.vectors(on_all, without_sun_disks), link)
         probes = self.stored_scene.probes
         rays: list[RayList] = list(self.light_transport.local.rays_to(element, probes, is_coarse=True))
         if element.paths.has_indirect:
@@ -245,6 +249,9 @@ class BakedFreeCamera:
         Args:
             element, without_sun_disks: as in `vectors`. probe_indices: the probes.
         """
+        on_all, link = unlinked(element)
+        if link is not None:
+            return self._darkened(self.fast_vectors(on_all, probe_indices, without_sun_disks), link, probe_indices)
         probes, rays = self.stored_scene.probes.rows(probe_indices), list[RayList]()
         if element.paths.direct:
             for source in element.local:
@@ -296,9 +303,10 @@ class BakedFreeCamera:
     ) -> tuple[HardShadowLight, ...]:
         """Return sun disks and small area lights, with their unoccluded light at some probes (None: all)."""
         probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)
+        sun_lights, link = self.sun_disks.hard_shadow_lights(light, probes), light.environment.link
         shadow_lights = [
-            *self.sun_disks.hard_shadow_lights(light, probes),
-            *(self._hard_shadow_light(source, probes) for source in hard_shadow_lights(light)),
+            *(sun._replace(vectors=self._darkened(sun.vectors, link, probe_indices)) for sun in sun_lights),
+            *(self._hard_shadow_light(source, probes, probe_indices) for source in hard_shadow_lights(light)),
         ]
         return (
             tuple(shadow_lights)
@@ -306,12 +314,14 @@ class BakedFreeCamera:
             else tuple(shadow_light.scatter(probe_indices, self.vectors_shape) for shadow_light in shadow_lights)
         )
 
-    def _hard_shadow_light(self, source: LightSource, probes: SurfacePoints) -> HardShadowLight:
-        rays = self.light_transport.local.unoccluded_rays(source.geometry, probes)
-        vectors = ray_incident_coefficients(probes, [rays])
-        return HardShadowLight(
-            source.geometry, local_shadow_targets(source.geometry), vectors, np.array(source.gain, np.float32)
-        )
+    def _hard_shadow_light(
+        self, source: LightSource, probes: SurfacePoints, probe_indices: NDArray[np.intp] | None
+    ) -> HardShadowLight:
+        local, (geometry, gain) = self.light_transport.local, source
+        rays = local.unoccluded_rays(geometry._replace(link=None), probes)
+        vectors = self._darkened(ray_incident_coefficients(probes, [rays]), geometry.link, probe_indices)
+        casters = local.linked.casters(geometry.shadow_link)
+        return HardShadowLight(geometry, local_shadow_targets(geometry), vectors, np.array(gain, np.float32), casters)
 
     def _preview_environment(
         self, lights: TriangleLights, probes: SurfacePoints, probe_indices: NDArray[np.intp]
@@ -340,17 +350,20 @@ class BakedFreeCamera:
         key = self.key, "unoccluded light", material
 
         def compute_environment() -> F32:
-            return self._unoccluded_environment(light, self.stored_scene.probes.rows(rows), is_preview=is_preview)
+            on_all = light._replace(environment=light.environment.unlinked)
+            return self._unoccluded_environment(on_all, self.stored_scene.probes.rows(rows), is_preview=is_preview)
 
         def compute_local(geometry: LightGeometry) -> F32:
-            return self.light_transport.local.unoccluded(geometry, self.stored_scene.probes.rows(rows))
+            on_all = geometry._replace(link=None, shadow_link=None)
+            return self.light_transport.local.unoccluded(on_all, self.stored_scene.probes.rows(rows))
 
-        radiance = cache.get_value((*key, light.environment, is_preview), compute_environment) * np.array(
-            light.environment_gain, np.float32
-        )
+        environment = cache.get_value((*key, light.environment.unlinked, is_preview), compute_environment)
+        environment = self._darkened(environment, light.environment.link, rows)
+        radiance = environment * np.array(light.environment_gain, np.float32)
         for geometry, gain in light.local:
             if geometry.kind != "mesh":
                 irradiance = cache.get_value((*key, geometry), lambda geometry=geometry: compute_local(geometry))  # type: ignore[misc]
+                irradiance = self._darkened(irradiance, geometry.link, rows)
                 radiance += np.outer(irradiance, np.array(gain, np.float32) / np.float32(np.pi))
         out = np.zeros((self.stored_scene.probes.num_points, 3), np.float32)
         out[rows] = radiance
@@ -384,9 +397,44 @@ class BakedFreeCamera:
     def _prefiltered(self) -> PrefilteredEnvironments:
         return PrefilteredEnvironments(self.light_transport)
 
+    def light_visibility_bits(self, link: Link | None) -> Shaped[NDArray[np.uint8], "probes bytes"]:
+        """Return the visibility of the light triangles from the probes, with adjacent triangles in sequence.
+
+        Args:
+            link: the surfaces that the environment lights; triangles are not visible from others.
+        """
+        if link is None:
+            return self._light_visibility_bits
+
+        def compute() -> NDArray[np.uint8]:
+            return self._darkened(self._light_visibility_bits, link)
+
+        return self.cache.transient.get_value((self.key, "visible lights", link), compute)
+
+    def check_links(self, links: Iterable[Link]) -> None:
+        """See `relume.live.opened.linked_surfaces.LinkedSurfaces.check`."""
+        self.light_transport.local.check_links(links)
+
+    def _darkened(
+        self, values: NDArray[Any], link: Link | None, probe_indices: NDArray[np.intp] | None = None
+    ) -> NDArray[Any]:
+        """Return values of probes (None: all) that are zero where a light with this link does not light the surface."""
+        if link is None:
+            return values
+        is_lit = self._is_lit(link) if probe_indices is None else self._is_lit(link)[probe_indices]
+        return values * is_lit.reshape(-1, *[1] * (values.ndim - 1))
+
+    def _is_lit(self, link: Link) -> Shaped[NDArray[np.bool_], " probes"]:
+        """True for the probes of linked surfaces; a ray from a probe at an edge would miss its surface."""
+        lattice_nodes, grid = self.stored_scene.lattice_nodes, self.stored_scene.probe_grid
+        is_lit_face = np.repeat(self.light_transport.local.linked.faces(link), 2)
+        node = grid.node_index[np.repeat(is_lit_face, num_nodes(grid.num_rows.ravel()))]
+        is_lit = np.zeros(self.stored_scene.probes.num_points, np.bool_)
+        is_lit[lattice_nodes.probe[node][lattice_nodes.weight[node] > 0]] = True
+        return is_lit
+
     @cached_property
-    def light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
-        """Visibility of the light triangles from the probes, with adjacent triangles in sequence."""
+    def _light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
         order, out = self._prefiltered.order, np.empty_like(self.visible)
         for rows in np.array_split(np.arange(len(out)), len(out) // _PROBES_PER_BATCH + 1):
             bits = np.unpackbits(self.visible[rows], axis=1, bitorder="little")
@@ -414,9 +462,9 @@ class BakedFreeCamera:
         """Return the surfaces that lobe rays meet, with their light. See `FreeCameraTransfer`."""
         return self.light_transport.lobe_scene(light, is_canceled)
 
-    def lobe_emitters(self, light: Illumination) -> Sequence[tuple[LobeEmitter, Rgb]]:
-        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
-        return self.light_transport.lobe_emitters(light)
+    def local_lobe_lights(self, light: Illumination) -> Sequence[LobeLight]:
+        """Return the local lights as narrow lobes see them. light: the illumination"""
+        return self.light_transport.local_lobe_lights(light)
 
     def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
         """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""

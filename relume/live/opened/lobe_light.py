@@ -42,7 +42,7 @@ from relume.transport.hit_textures import NO_TEXTURES, HitTextures, hit_textures
 from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
 from relume.transport.lobe_paths import LobeSurfaces, edge_curvature
 from relume.transport.lobe_rays import NO_EMISSION, LobeEnvironment
-from relume.transport.lobe_scene import LobeScene
+from relume.transport.lobe_scene import LobeLinks, LobeScene
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.patch_lookup import PatchLookup, patch_reach
 from relume.transport.shading_points import GatherRays, ShadingPoints
@@ -118,6 +118,7 @@ class LobeTracer:
         patches: LobePatches,
         outgoing: OutgoingLight,
         emission: Shaped[F32, "materials 3"],
+        links: LobeLinks,
         *,
         goes_on: bool,
     ) -> LobeScene:
@@ -126,13 +127,13 @@ class LobeTracer:
         Args:
             reflectances: of all materials. images: of the look, see `hit_images`.
             patches: their textures and reflectances.
-            outgoing, emission: as in `LobeScene`. goes_on: rays go on from narrow lobes.
+            outgoing, emission, links: as in `LobeScene`. goes_on: rays go on from narrow lobes.
         """
         tint = patches.mean[TEXTURES.index("specular")]
         surfaces = self._surfaces(reflectances if goes_on else (), tint, images)
         textured = textured_light(outgoing.isotropic, patches.unit_share, patches.mean, surfaces.textures.slots)
         light_args = outgoing, textured, patches.broad_share, emission if goes_on else NO_EMISSION
-        return LobeScene(self._tracer.geometry, self._lookup, surfaces, *light_args)
+        return LobeScene(self._tracer.geometry, self._lookup, surfaces, *light_args, links)
 
     def _surfaces(self, reflectances: Reflectances, tint: Shaped[F32, "patches 3"], images: HitImages) -> LobeSurfaces:
         """Return the surfaces that rays meet; those of `reflectances` with narrow lobes pass rays on."""

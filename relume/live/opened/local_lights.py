@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,9 +23,10 @@ from relume.lights.local_lights import (
     prepare_local_lights,
 )
 from relume.live.fixed_camera.illumination import Illumination, LightSource
-from relume.live.free_camera.lobe_lights import LobeEmitter
+from relume.live.free_camera.lobe_lights import LobeEmitter, LobeLight
+from relume.live.opened.linked_surfaces import LinkedSurfaces
 from relume.look import LightGeometry
-from relume.look.model import Rgb
+from relume.look.model import Link
 from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.emission_image import ImageEmitter, image_emitter
@@ -87,6 +88,25 @@ class LocalLights:
         """Acceleration structure of the triangles."""
         return EmbreeScene.build(self.positions, self.faces, read_alpha_test(self._store, self.positions, self.faces))
 
+    @cached_property
+    def linked(self) -> LinkedSurfaces:
+        """The surfaces that lights light, and those that cast their shadows."""
+        return LinkedSurfaces(self._store, self.positions, self.faces, self.embree, self._cache, self._key)
+
+    def is_lit_behind(
+        self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
+    ) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for rays that start on a surface that a light with this link lights.
+
+        Args:
+            link: of the light. origins: where the rays start. directions: away from the surface.
+        """
+        return self.linked.is_lit(link, origins, directions)
+
+    def check_links(self, links: Iterable[Link]) -> None:
+        """See `LinkedSurfaces.check`."""
+        self.linked.check(links)
+
     def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
         """Return the number of samples of a light, given that of a rectangle; see `make_light_strata`.
 
@@ -124,11 +144,14 @@ class LocalLights:
             rays.append(LocalRays(*self.sample_light(geometry, num_samples), np.array(gain, np.float32), visible))
         return rays
 
-    def lobe_emitters(self, light: Illumination) -> list[tuple[LobeEmitter, Rgb]]:
-        """Return the local lights as narrow lobes see them, with a gain each. light: the illumination"""
+    def local_lobe_lights(self, light: Illumination) -> list[LobeLight]:
+        """Return the local lights as narrow lobes see them. light: the illumination"""
         if not light.paths.direct:
             return []
-        return [(self._lobe_emitter(geometry), gain) for geometry, gain in light.local]
+        return [
+            LobeLight(self._lobe_emitter(geometry), gain, self.linked.casters(geometry.shadow_link), geometry.link)
+            for geometry, gain in light.local
+        ]
 
     def _lobe_emitter(self, geometry: LightGeometry) -> LobeEmitter:
         return self._cache.transient.get_value(
@@ -138,7 +161,10 @@ class LocalLights:
 
     def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
         """Preview a light of unit emission at points, with few samples if it has an extent."""
-        return trace_moving_light(self.embree, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
+        casters = self.linked.casters(geometry.shadow_link)
+        light = trace_moving_light(casters, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
+        self.linked.darken(geometry.link, points, *light)
+        return light
 
     def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
         """Return rays of a previewed light, for directional terms. visible: `MovingLight.visible`"""
@@ -147,9 +173,10 @@ class LocalLights:
         )
 
     def unoccluded_rays(self, geometry: LightGeometry, points: SurfacePoints) -> LocalRays:
-        """Return unoccluded light of unit emission at points, as rays."""
+        """Return unoccluded light of unit emission at points that it lights, as rays."""
         light, strata = self.sample_light(geometry, SAMPLES)
         visible = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
+        self.linked.darken(geometry.link, points, visible)
         return LocalRays(light, strata, _ONES, visible)
 
     def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
@@ -177,12 +204,15 @@ class LocalLights:
     def trace(
         self, geometry: LightGeometry, points: SurfacePoints, num_samples: int
     ) -> Shaped[NDArray[np.uint8], "n bytes"]:
-        """Trace the visibility of a light's samples from points; see `LocalRays.visible`.
+        """Trace the visibility of a light's samples from points that it lights; see `LocalRays.visible`.
 
         Args:
             geometry: geometry of the light. points: receivers. num_samples: from `LocalLights.num_samples`.
         """
-        return trace_light_visibility(self.embree, *self.sample_light(geometry, num_samples), points)
+        casters = self.linked.casters(geometry.shadow_link)
+        visible = trace_light_visibility(casters, *self.sample_light(geometry, num_samples), points)
+        self.linked.darken(geometry.link, points, visible)
+        return visible
 
     def sample_light(self, geometry: LightGeometry, rectangle_samples: int) -> tuple[LocalLight, LightStrata]:
         """Build a light and its samples; see `make_light_strata`."""

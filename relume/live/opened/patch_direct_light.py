@@ -18,6 +18,7 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.harmonic_light import HarmonicLight
 from relume.live.opened.local_lights import LocalLights
 from relume.look import EnvironmentKey, LightGeometry
+from relume.look.model import Link
 from relume.math.zernike import OUTGOING_DEGREE
 from relume.methods.spherical_harmonic_transfer import PATCH_DEGREE
 from relume.radiosity.highlight_transport import DirectLobes
@@ -48,6 +49,11 @@ class LocalPatchLight:
     ) -> None:
         self._local, self._patches = local, patches
         self._cache, self._key, self._normal_overrides = cache, key, normal_overrides
+
+    def is_lit(self, link: Link | None) -> Shaped[NDArray[np.bool_], " patches"]:
+        """True for the patches that a light with this link lights: each is of one mesh."""
+        points = self._patches.first_points(np.arange(self._patches.num_patches))
+        return self._local.linked.is_lit(link, points.position, points.normal)
 
     def irradiance(self, geometry: LightGeometry) -> Shaped[F32, " patches"]:
         """Return the irradiance of each patch, averaged over its sample points."""
@@ -137,10 +143,11 @@ class DirectPatchLight:
         )
         local_irradiance = self._local.preview_irradiance if is_preview else self._local.irradiance
         if light.has_environment:
-            gain = np.array(light.environment_gain, np.float32)
-            incident.irradiance[:] += gain * self._irradiance(light.environment, is_preview)
-            incident.coefficients[:] += gain[:, None] * self._coefficients(
-                light.environment, reflectance_operator, is_preview
+            environment, is_lit = light.environment.unlinked, self._local.is_lit(light.environment.link)[:, None]
+            gain = np.array(light.environment_gain, np.float32) * is_lit
+            incident.irradiance[:] += gain * self._irradiance(environment, is_preview)
+            incident.coefficients[:] += gain[reflectance_operator.rows, :, None] * self._coefficients(
+                environment, reflectance_operator, is_preview
             )
         for geometry, source_gain in light.local:
             gain = np.array(source_gain, np.float32)
@@ -165,7 +172,9 @@ class DirectPatchLight:
             return DirectLobes(rays=rays, ray_points=ray_points)
         lights = self._find_lights(light.environment, LightQuality.PREVIEW if is_preview else LightQuality.EXACT)
         lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
-        return DirectLobes(lights, patches.visibility_bits(rows), rays, ray_points)
+        visible = patches.visibility_bits(rows)
+        visible[~self._local.is_lit(light.environment.link)[rows]] = 0
+        return DirectLobes(lights, visible, rays, ray_points)
 
     def _exact_lights(self, environment: EnvironmentKey) -> TriangleLights:
         return self._find_lights(environment, LightQuality.EXACT)

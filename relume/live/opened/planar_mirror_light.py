@@ -27,6 +27,7 @@ from relume.core.cache import Cache
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import LightQuality
+from relume.live.opened.local_lights import LocalLights
 from relume.look import EnvironmentKey
 from relume.math.zernike import OUTGOING_DEGREE
 from relume.methods.mirror_lights import NO_PLANE, MirrorLights
@@ -62,7 +63,7 @@ class MirrorLightTransfer:
     """Light of planar mirrors of one bake, in any look; thread-safe.
 
     Args:
-        mirror_lights: the traced lights. patches: patches of the bake.
+        mirror_lights: the traced lights. patches: patches of the bake. local: knows linked surfaces.
         find_lights: returns the triangles of an environment.
         cache: cache of results computed from the bake. key: key of the bake in it.
     """
@@ -71,11 +72,13 @@ class MirrorLightTransfer:
         self,
         mirror_lights: MirrorLights,
         patches: PatchLight,
+        local: LocalLights,
         find_lights: Callable[[EnvironmentKey, LightQuality], TriangleLights],
         cache: Cache,
         key: str,
     ) -> None:
         self._mirror_lights, self._patches, self._find_lights = mirror_lights, patches, find_lights
+        self._linked = local.linked
         self._cache, self._key = cache, key
         self._directions = mirrored_lights(mirror_lights.mirrors.normal, mirror_lights.direction).reshape(-1, 3)
 
@@ -108,10 +111,10 @@ class MirrorLightTransfer:
             gain * self._lights_of(light.environment).irradiance[mirror_lights.lights],
         )
         cosine, tints = np.abs(mirror_lights.mirrors.normal @ mirror_lights.direction.T), self._patches.textures[1]
-        mirror_reflectance = np.zeros((*cosine.shape, 3))
+        mirror_reflectance, is_lit = np.zeros((*cosine.shape, 3)), self._lit_patches(light.environment)
         for p, material in enumerate(mirror_lights.mirrors.material):
             on_plane = mirror_lights.plane == p
-            tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
+            tint = (is_lit[on_plane, None] * tints[on_plane]).mean(axis=0) if on_plane.any() else np.ones(3)
             terms = light.reflectances[material].planar_mirrors
             mirror_reflectance[p] = specular_terms(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
         return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
@@ -136,7 +139,9 @@ class MirrorLightTransfer:
         highlights = self._patches.highlight_tables(reflectances, reflectance_operator)
         lights = self._bright_lights(light.environment)
         lights = replace(lights, irradiance=np.array(light.environment_gain, np.float32) * lights.irradiance)
-        direct_lobes = DirectLobes(lights, self._patches.visibility_bits(highlights.rows, self._light_indices))
+        visible = self._patches.visibility_bits(highlights.rows, self._light_indices)
+        visible[~self._lit_patches(light.environment)[highlights.rows]] = 0
+        direct_lobes = DirectLobes(lights, visible)
         return first_bounce(
             reflectance_operator,
             incident,
@@ -150,7 +155,8 @@ class MirrorLightTransfer:
         all_patches = self._patches.reflectance_operator(mirror_reflectances)
         is_on_plane = self._mirror_lights.plane[all_patches.rows] != NO_PLANE
         rows = all_patches.rows[is_on_plane]
-        incident, gain = self._incident_light(light.environment, rows), np.array(light.environment_gain, np.float32)
+        environment, is_lit = light.environment.unlinked, self._lit_patches(light.environment)[:, None]
+        incident, gain = self._incident_light(environment, rows), np.array(light.environment_gain, np.float32) * is_lit
         reflectance = all_patches.reflectance * (self._mirror_lights.plane != NO_PLANE)[:, None]
         plane_patches = replace(
             all_patches,
@@ -158,7 +164,12 @@ class MirrorLightTransfer:
             rows=rows,
             reflectance_matrix=all_patches.reflectance_matrix[:, is_on_plane],
         )
-        return plane_patches, IncidentLight(gain * incident.irradiance, gain[:, None] * incident.coefficients)
+        return plane_patches, IncidentLight(gain * incident.irradiance, gain[rows, :, None] * incident.coefficients)
+
+    def _lit_patches(self, environment: EnvironmentKey) -> Shaped[NDArray[np.bool_], " patches"]:
+        """True for the patches that an environment lights."""
+        points = self._patches.first_points(np.arange(self._patches.num_patches))
+        return self._linked.is_lit(environment.link, points.position, points.normal)
 
     def _lights_of(self, environment: EnvironmentKey) -> TriangleLights:
         return self._find_lights(environment, LightQuality.EXACT)

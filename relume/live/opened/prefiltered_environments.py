@@ -111,12 +111,13 @@ class PrefilteredEnvironments:
             return build_light_lists(*light_arrays, tile_fractions[:, self.order], widths)
 
         return self.light_transport.cache.transient.get_value(
-            (self.light_transport.key, "lights of lobes", environment, widths), compute
+            (self.light_transport.key, "lights of lobes", environment.unlinked, widths), compute
         )
 
     def combined(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
         """Return an environment's lights for highlights. is_preview: approximates other than the baked environment."""
-        light_transport, is_fast = self.light_transport, is_preview and environment != BAKED_ENVIRONMENT
+        environment, light_transport = environment.unlinked, self.light_transport
+        is_fast = is_preview and environment != BAKED_ENVIRONMENT
 
         def compute() -> EnvironmentLights:
             quality = LightQuality.PREVIEW if is_fast else LightQuality.EXACT

@@ -39,7 +39,7 @@ class SunExtractor:
 
     def remaining_lights(self, light: Illumination, quality: LightQuality) -> TriangleLights:
         """Return the environment triangles for direct illumination, without sun disks."""
-        transport, environment, label = self.light_transport, light.environment, "lights without sun disks"
+        transport, environment, label = self.light_transport, light.environment.unlinked, "lights without sun disks"
         if not self.are_in(light):
             return transport.direct_lights(light, quality)
         if quality is LightQuality.PREVIEW:
@@ -63,7 +63,8 @@ class SunExtractor:
         """Yield sun disks for direct illumination, with their unoccluded light at points."""
         if not self.are_in(light):
             return
-        key, gain = light.environment, np.array(light.environment_gain, np.float32)
+        key, gain = light.environment.unlinked, np.array(light.environment_gain, np.float32)
         for k, sun_disk in enumerate(self._split(key.map).sun_disks):
             vectors = unoccluded_sun_vectors(sun_disk, key.rotation, points)
-            yield HardShadowLight((key, k), sun_shadow_targets(sun_disk, key.rotation), vectors, gain)
+            targets, embree = sun_shadow_targets(sun_disk, key.rotation), self.light_transport.local.embree
+            yield HardShadowLight((key, k), targets, vectors, gain, embree)

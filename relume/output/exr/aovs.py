@@ -60,11 +60,12 @@ class AovTracer:
     def from_look(cls, scene: Scene, look: Look) -> AovTracer:
         """Prepare a scene. Raises NotFoundError and SceneError for missing images of the look."""
         scene = with_overrides(scene, look)
-        lights = emitters(scene, look)
+        geometry = build_scene_buffers(scene)
+        lights = emitters(scene, geometry, look)
         names = [material.name for material in scene.materials]
         return cls(
             scene,
-            build_scene_buffers(scene),
+            geometry,
             look,
             tuple(_albedos(look.materials[name].terms) for name in names),
             np.array([emitted_radiance(lights, name) for name in names]).reshape(-1, 3),

@@ -7,6 +7,8 @@ relume does not have become the nearest one with the same power in its main dire
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.scene.collect_lights import LightCollector
 from relume.scene.validate import MAX_METERS
 from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
+from relume.scene_io.usd.light_links import read_links
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -50,6 +53,9 @@ def radiance(prim: Any, time: Any) -> Shaped[F64, " 3"]:
 class UsdLightReader:
     """Reads the lights of one stage.
 
+    Args:
+        time, meters, images, collector, warnings: of the stage.
+        objects: name of each object of the scene by the path of its prim, see `read_links`.
     Attributes:
         environment: light of the first dome; None without one.
     """
@@ -61,21 +67,31 @@ class UsdLightReader:
         images: SurfaceImages,
         collector: LightCollector,
         warnings: list[ImporterWarning],
+        objects: Mapping[str, str],
     ) -> None:
-        self._time, self._meters, self._images = time, meters, images
+        self._time, self._meters, self._images, self._objects = time, meters, images, objects
         self._collector, self._warnings = collector, warnings
         self.environment: Environment | None = None
 
     def add(self, prim: Any, to_world: Shaped[F64, "4 4"]) -> None:
-        """Add a light; it emits along the −Z of its prim.
+        """Add a light with its links; it emits along the −Z of its prim.
 
         Args:
             prim: a light of `KINDS`. to_world: from its space to meters.
         Raises:
             SceneError: there are more lights than a look can have.
         """
-        kind, label = str(prim.GetTypeName()), f"light {quote(prim.GetName())}"
-        self._warn_links(prim, label)
+        lights, label = self._collector.lights, f"light {quote(prim.GetName())}"
+        first = len(lights)
+        self._add(prim, to_world, label)
+        links = read_links(prim, label, self._objects, self._warnings)
+        if str(prim.GetTypeName()) in DOMES and links:
+            self._warnings.append(unsupported(f"{_capital(label)} lights all objects: link the environment instead."))
+        lights[first:] = [replace(light, fields={**light.fields, **links}) for light in lights[first:]]
+
+    def _add(self, prim: Any, to_world: Shaped[F64, "4 4"], label: str) -> None:
+        kind = str(prim.GetTypeName())
+        self._warn_filters(prim, label)
         if kind in DOMES:
             self._add_dome(prim, to_world, label)
             return
@@ -207,17 +223,10 @@ class UsdLightReader:
             return np.ones(3)
         return self._images.mean(ImageInput(path.path, is_srgb=True), label)
 
-    def _warn_links(self, prim: Any, label: str) -> None:
+    def _warn_filters(self, prim: Any, label: str) -> None:
         from pxr import UsdLux
 
-        light = UsdLux.LightAPI(prim)
-        for api, effect in (
-            (light.GetLightLinkCollectionAPI(), "lights"),
-            (light.GetShadowLinkCollectionAPI(), "shadows"),
-        ):
-            if api.GetIncludesRel().GetTargets() or api.GetExcludesRel().GetTargets():
-                self._warnings.append(unsupported(f"{_capital(label)} {effect} all objects: links aren't supported."))
-        if light.GetFiltersRel().GetTargets():
+        if UsdLux.LightAPI(prim).GetFiltersRel().GetTargets():
             self._warnings.append(unsupported(f"Filters of {label} aren't supported."))
 
     def _add_dome(self, prim: Any, to_world: F64, label: str) -> None:

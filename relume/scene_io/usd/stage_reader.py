@@ -101,8 +101,9 @@ def import_usd(
 
 @dataclass(frozen=True)
 class _Shape:
-    """Triangles of a prim, or of a subset of it, at one place."""
+    """Triangles of a prim, or of a subset of it, at one place. path: of the prim"""
 
+    path: str
     name: str
     triangles: PrimTriangles
     to_world: F64
@@ -130,6 +131,7 @@ class _StageReader:
         self._parts: dict[tuple[str, MaterialKey], list[tuple[str, PrimTriangles, MaterialKey]]] = {}
         self._colors: set[tuple[float, ...]] = set()
         self._shapes: list[_Shape] = []
+        self._objects: dict[str, str] = {}  # names of meshes by the paths of their prims
         self._placed: list[tuple[Any, F64]] = []  # lights and cameras
         self._other_uvs: dict[tuple[str, str], list[str]] = {}  # meshes by the set that they lack and the one they have
         self._skipped: Counter[str] = Counter()
@@ -147,9 +149,9 @@ class _StageReader:
         if not meshes:
             raise SceneError(no_triangles(self._warnings, "its triangles have no area"))
         if len(meshes) > _MAX_SEPARATE_MESHES:
-            meshes = merge_by_material(meshes)
+            meshes, self._objects = merge_by_material(meshes), {}
         collector = LightCollector(self._warnings)
-        lights = UsdLightReader(self._time, meters, self._images, collector, self._warnings)
+        lights = UsdLightReader(self._time, meters, self._images, collector, self._warnings, self._objects)
         cameras = self._lights_and_cameras(lights, origin)
         emissions = [np.array(material.read_material.emission) for material in materials]
         scene_materials = collector.emissive_light(
@@ -252,7 +254,7 @@ class _StageReader:
             if len(self._shapes) == MAX_INSTANCES:
                 raise SceneError(f"the scene shows more than {MAX_INSTANCES:,} meshes; merge them")
             double_sided = bool(prim.GetAttribute("doubleSided").Get(self._time))
-            self._shapes.append(_Shape(name, triangles, to_world, key, double_sided))
+            self._shapes.append(_Shape(str(prim.GetPath()), name, triangles, to_world, key, double_sided))
 
     def _read_parts(self, prim: Any) -> list[tuple[str, PrimTriangles, MaterialKey]]:
         """Triangles of a prim for each of its materials, cached for its instances."""
@@ -346,7 +348,9 @@ class _StageReader:
             material = reader.read(material_name, surface, unique, thickness, double_sided=is_double_sided)
             for shape in shapes:
                 mesh = self._make_mesh(shape, material, len(materials), origin, unique_name(shape.name, names))
-                meshes.extend([] if mesh is None else [mesh])
+                if mesh is not None:
+                    meshes.append(mesh)
+                    self._objects[shape.path] = mesh.name
             materials.append(material)
         reader.warn_occlusion_maps()
         for (wanted, other), without in self._other_uvs.items():

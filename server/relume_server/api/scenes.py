@@ -195,6 +195,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str
         ],
         materials=[SceneMaterial(**{**_MATERIAL_DEFAULTS, **material}) for material in record.materials],
         lights=list(record.lights),
+        objects=list(record.objects),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
         warnings=[SceneWarning.model_validate(warning.document()) for warning in record.warnings],
         import_options=ImportOptions.model_validate(record.import_options),

@@ -71,7 +71,8 @@ class SceneBody(Body):
     """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
 
     `warnings`: most severe first. `import_options`: for the next import of its file. `size`: sides of its bounding box
-    along x, y and z without a shadow catcher, meters; null for a scene of an older version.
+    along x, y and z without a shadow catcher, meters; null for a scene of an older version. `objects`: names for the
+    links of lights; empty for a scene of an older version, or with more than 2,000.
     """
 
     id: str
@@ -80,6 +81,7 @@ class SceneBody(Body):
     views: list[SceneView]
     materials: list[SceneMaterial]
     lights: list[str]
+    objects: list[str]
     variants: list[SceneVariant]
     warnings: list[SceneWarning]
     import_options: ImportOptions

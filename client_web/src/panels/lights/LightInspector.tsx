@@ -13,6 +13,7 @@ import { Emission } from "./Emission";
 import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "./lightFields";
 import { placeLight } from "./handleGeometry";
 import { completeLight, LIGHT_KINDS, labelOf, changeKind, type AddedKind } from "./lightKinds";
+import { LinkField } from "./LinkField";
 import {
   changeLight,
   duplicateLight,
@@ -151,6 +152,8 @@ export function LightInspector({ name, light }: NamedLight) {
         {angleFieldsOf(light).map((field) => (
           <AngleFieldSlider key={field.label} name={name} light={light} angleField={field} />
         ))}
+        <LinkField label="Lights" path={lightPath(name, "link")} link={light.link ?? null} />
+        <LinkField label="Shadows" path={lightPath(name, "shadow_link")} link={light.shadow_link ?? null} />
       </section>
     </div>
   );

@@ -16,9 +16,13 @@ import { LIGHT_KINDS, labelOf } from "./lightKinds";
 import { editLight, lightPath, lights } from "./lightEdits";
 import { MatchLock } from "./match/MatchLock";
 import { isMatchOpen } from "./match/match";
+import { isLinked, linkText } from "./links";
 import { isAddMenuOpen, placingKind, startPlacement, stopPlacement } from "./placement";
 
 const TITLE = "Lights";
+
+const linkTitle = (light: Light) =>
+  `Lights: ${linkText(light.link ?? null)}. Shadows: ${linkText(light.shadow_link ?? null)}.`;
 
 function LightRow({ name, light }: { name: string; light: Light }) {
   const selected = name === selectedLight.value;
@@ -44,6 +48,12 @@ function LightRow({ name, light }: { name: string; light: Light }) {
         onClick={() => selectLight(selected ? null : name)}
       >
         {name}
+        {isLinked(light) && (
+          <small class="linked" title={linkTitle(light)} aria-label="linked">
+            {" "}
+            ⚯
+          </small>
+        )}
       </button>
       <input
         type="color"

@@ -8,6 +8,7 @@ import { IconButton } from "../../ui/IconButton";
 import { LabeledColor } from "../../ui/LabeledColor";
 import { LabeledSlider } from "../../ui/LabeledSlider";
 import { Section } from "../../ui/Section";
+import { LinkField } from "../lights/LinkField";
 import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 import { imported, offerToDeleteEnvironment } from "./environments";
 
@@ -81,6 +82,7 @@ export function EnvironmentPanel() {
         initial={initial.color}
         onChange={(value) => editValue("Environment tint", "/environment/color", value)}
       />
+      <LinkField label="Lights" path="/environment/link" link={environment.link ?? null} />
     </Section>
   );
 }

@@ -21,6 +21,7 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
 )
 from relume.live.free_camera.normal_mapping import basis_gradients
 from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.look.model import Link
 from relume.math.zernike import NUM_FUNCTIONS, recurrence_by_degree
 from relume.probes.stored_scene import StoredScene
 from relume.probes.triangle_grids import ProbeGrid, num_nodes
@@ -92,11 +93,16 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
         "probe_positions": lambda: _to_vec4(probes.position, 0),
         "probe_normals": lambda: _to_vec4(probes.normal, 0).astype(np.float16),
         "tangents": lambda: _to_vec4(probes.tangent, 0).astype(np.float16),
-        "visible_lights": lambda: _bits(transfer.light_visibility_bits),
+        "visible_lights": lambda: visible_lights(transfer, None),
     }
     if len(stored_scene.textures.wraps):
         factories |= _texture_factories(stored_scene, stored_scene.textures)
     return factories
+
+
+def visible_lights(transfer: FreeCameraTransfer, link: Link | None) -> Texels:
+    """Return the visibility bits of the lights of an environment with a link; see `array_factories`."""
+    return _bits(transfer.light_visibility_bits(link))
 
 
 class NodeArrays(NamedTuple):

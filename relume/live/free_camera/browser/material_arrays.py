@@ -16,7 +16,7 @@ from relume.live.fixed_camera.illumination import material_emission
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
 from relume.live.free_camera.basis.lobe_shapes import NUM_AZIMUTHS, NUM_GRID_DIRECTIONS
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
-from relume.live.free_camera.browser.geometry_arrays import first_probes, overridden_texture_arrays
+from relume.live.free_camera.browser.geometry_arrays import first_probes, overridden_texture_arrays, visible_lights
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.frame import FrameRequestState, MaterialState
 from relume.live.free_camera.highlights.interpolated_highlights import NORMAL_VARIANCE_FACTOR
@@ -104,6 +104,8 @@ def array_blocks(
         blocks["lobe_lights"] = ArrayBlock(
             (light.environment, widths), lambda: _lobe_light_arrays(transfer.lobe_lights(light.environment, widths))
         )
+    if (link := light.environment.link) is not None:
+        blocks["linked_lights"] = ArrayBlock(link, lambda: {"visible_lights": visible_lights(transfer, link)})
     if background.kind == "blurred":
         blurred = light.environment.map, background.blur
         blocks["background"] = ArrayBlock(
