@@ -5,9 +5,9 @@ Terms stay dictionaries, so that `relume.brdf.curves` handles looks and their JS
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, NotRequired
+from typing import Annotated, Literal, NamedTuple, NotRequired, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from typing_extensions import TypedDict  # pydantic requires it before Python 3.12
 
 from relume.brdf.texture_slots import NormalMap
@@ -150,6 +150,15 @@ class LightGeometry(NamedTuple):
     channel: int | None = None
 
 
+class LightGroupLook(_FrozenModel):
+    """A group of lights: `intensity` and `color` multiply the gains of its `lights`, which a disabled group turns off."""
+
+    lights: tuple[str, ...]
+    intensity: float
+    color: Rgb
+    enabled: bool
+
+
 class _LightLook(_FrozenModel):
     """Common fields of all lights; the unit of `emission` depends on the kind."""
 
@@ -157,12 +166,21 @@ class _LightLook(_FrozenModel):
     color: Rgb
     enabled: bool
     emission: Rgb
+    _group: LightGroupLook | None = PrivateAttr(None)
 
     @property
     def gain(self) -> Rgb:
-        """Factor of each channel of a light with unit emission: intensity · color · emission; zero if disabled."""
-        scale = self.intensity if self.enabled else 0.0
-        red, green, blue = (scale * c * e for c, e in zip(self.color, self.emission, strict=True))
+        """Factor of each channel of a light with unit emission, `full_gain`; zero if it or its group is disabled."""
+        is_enabled = self.enabled and (self._group is None or self._group.enabled)
+        return self.full_gain if is_enabled else (0.0, 0.0, 0.0)
+
+    @property
+    def full_gain(self) -> Rgb:
+        """Factor of each channel of an enabled light: intensity · color · emission, and those of its group."""
+        gain = [self.intensity * c * e for c, e in zip(self.color, self.emission, strict=True)]
+        if self._group is not None:
+            gain = [self._group.intensity * c * g for c, g in zip(self._group.color, gain, strict=True)]
+        red, green, blue = gain
         return red, green, blue
 
     @property
@@ -301,8 +319,16 @@ class Look(_FrozenModel):
     environment: EnvironmentLook
     background: BackgroundLook
     lights: dict[str, LightLook]
+    light_groups: dict[str, LightGroupLook]
     transport: TransportLook
     display: DisplayLook
+
+    @model_validator(mode="after")
+    def _group_lights(self) -> Self:
+        for group in self.light_groups.values():
+            for name in group.lights:
+                self.lights[name]._group = group
+        return self
 
     def without_compositing(self) -> Look:
         """The look without shadow catchers and with the environment as background, as the reference renders it."""

@@ -163,10 +163,12 @@ class Light:
 
     Attributes:
         fields: `kind` and all fields that differ from its defaults, as in a look document.
+        group: light group that the default look proposes; "" for none.
     """
 
     name: str
     fields: dict[str, Any]
+    group: str = ""
 
 
 @dataclass(frozen=True)

@@ -199,7 +199,10 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     if scene.variants:
         document["variants"] = scene.variants
     if scene.lights:
-        document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
+        document["lights"] = [
+            {"name": light.name, "fields": light.fields, **({"group": light.group} if light.group else {})}
+            for light in scene.lights
+        ]
     if any(scene.offset):
         document["offset"] = list(scene.offset)
     if scene.import_options:
@@ -232,7 +235,10 @@ def _from_document(document: dict[str, Any], arrays: Arrays) -> Scene:
         Environment(str(document["environment"]["name"]), arrays["environment"]),
         tuple(warning_of(warning) for warning in document["warnings"]),
         {str(name): dict(look) for name, look in document.get("variants", {}).items()},
-        tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
+        tuple(
+            Light(str(light["name"]), dict(light["fields"]), str(light.get("group", "")))
+            for light in document.get("lights", ())
+        ),
         _offset(document),
         {str(key): str(value) for key, value in document.get("import_options", {}).items()},
     )
