@@ -8,7 +8,6 @@ group that it leaves out is dissolved, also one that the scene proposes.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -26,12 +25,6 @@ from relume.scene.validate import MAX_LIGHT_NAME, MAX_LIGHTS
 
 MAX_LIGHT_GROUPS = MAX_LIGHTS
 DEFAULT_GROUP: dict[str, Any] = {"lights": [], "intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True}
-_NUMBER = re.compile(r"[\s._-]*\d+$")
-
-
-def name_prefix(name: str) -> str:
-    """Return a light's name without the number at its end: "Downlight" for "Downlight.001"."""
-    return _NUMBER.sub("", name) or name
 
 
 def default_light_groups(lights: Sequence[Light]) -> dict[str, Any]:
@@ -50,7 +43,7 @@ def complete_light_groups(
 
     Args:
         partial: the groups by name; a group of the scene may omit fields, also its lights.
-        default: groups of the scene. previous: those of a valid look; objects shared with it are checked for lights only.
+        default: groups of the scene. previous: those of a valid look; objects shared with it are not validated again.
         light_names: lights of the look.
     """
     pointer: Pointer = ("light_groups",)

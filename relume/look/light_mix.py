@@ -20,6 +20,8 @@ UNITS = {
     "directional": "W/m²",
     "rectangle": "W/(sr·m²)",
     "mesh": "W/(sr·m²)",
+    "points": "W/sr",
+    "panels": "W/(sr·m²)",
 }
 """Units of `emission` by the kind of light."""
 _FIELDS = {"intensity", "color", "enabled", "emission"}

@@ -15,7 +15,7 @@ from relume.image_io.ocio.view import OcioView
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
-LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
+LightKind = Literal["point", "spot", "directional", "rectangle", "mesh", "points", "panels"]
 ToneMap = Literal["agx", "filmic", "none"]
 PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
@@ -136,7 +136,8 @@ class EnvironmentLook(_FrozenModel):
 
 class LightGeometry(NamedTuple):
     """Position and shape of a local light; fields that its kind lacks have their defaults. Lights with equal geometry
-    differ only by a factor for each channel. Fields as in the look; `channel`: the one of RGB that it emits, as a part
+    differ only by a factor for each channel. Fields as in the look; `source`: name of a source of several lights in the
+    scene; `channel`: the one of RGB that it emits, as a part
     of a light that emits a colored image."""
 
     kind: LightKind
@@ -147,11 +148,12 @@ class LightGeometry(NamedTuple):
     size: tuple[float, float] = (0.0, 0.0)
     material: str = ""
     image: str | None = None
+    source: str = ""
     channel: int | None = None
 
 
 class LightGroupLook(_FrozenModel):
-    """A group of lights: `intensity` and `color` multiply the gains of its `lights`, which a disabled group turns off."""
+    """A group of lights: `intensity` and `color` multiply their gains; a disabled group turns them off."""
 
     lights: tuple[str, ...]
     intensity: float
@@ -238,7 +240,22 @@ class MeshLook(_LightLook):
     image: str | None = None
 
 
-LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]
+class PointsLook(_LightLook):
+    """Many point and spot lights of the scene as one source, its `source`; emission is their mean intensity, W/sr."""
+
+    kind: Literal["points"]
+    source: str
+
+
+class PanelsLook(_LightLook):
+    """Many rectangles of the scene as one source, its `source`; emission is their mean radiance."""
+
+    kind: Literal["panels"]
+    source: str
+
+
+SingleLightLook = PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook
+LightLook = Annotated[SingleLightLook | PointsLook | PanelsLook, Field(discriminator="kind")]
 
 
 _MANY_BOUNCES = 8  # later ones bring hardly any light
