@@ -1,4 +1,4 @@
-import { beforeEach, expect, test } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { history } from "../src/edit/history";
 import { activePath } from "../src/edit/activeControl";
 import {
@@ -15,6 +15,7 @@ import {
 import { removeLight, renameLight } from "../src/panels/lights/lightEdits";
 import { completeLook } from "../src/panels/looks/abCompare";
 import { withLightMix } from "../src/panels/looks/lookFiles";
+import { undo } from "../src/panels/looks/undoRedo";
 import type { Light, Look } from "../src/protocol";
 import { defaultLook, look } from "../src/state/look";
 import { visibleLookOf } from "../src/state/visibility/displayState";
@@ -34,6 +35,7 @@ const BASE: Look = { ...LOOK, lights: Object.fromEntries(NAMES.map((name) => [na
 const members = () => Object.fromEntries(Object.entries(look.value?.light_groups ?? {}).map(([k, g]) => [k, g.lights]));
 
 beforeEach(() => {
+  vi.stubGlobal("window", { setTimeout: () => 0 });
   history.clear();
   defaultLook.value = LOOK;
   look.value = BASE;
@@ -50,10 +52,10 @@ test("names end with numbers as programs write them", () => {
   ]);
 });
 
-test("lights of one name become a group, in one step that can be undone", () => {
+test("lights of one name become a group, in one step that can be undone", async () => {
   groupByPrefix();
   expect(members()).toEqual({ Lamp: ["Lamp", "Lamp.001", "Lamp.002"] });
-  history.undo();
+  await undo();
   expect(members()).toEqual({});
 });
 
@@ -84,13 +86,13 @@ test("groups are renamed in place, and dissolved without their lights", () => {
   expect(Object.keys(look.value?.lights ?? {})).toEqual(NAMES);
 });
 
-test("a group follows lights that are renamed or removed", () => {
+test("a group follows lights that are renamed or removed", async () => {
   createGroup("Key");
   renameLight("Key", "Main");
   expect(members()).toEqual({ Key: ["Main"] });
   removeLight("Main");
   expect(members()).toEqual({ Key: [] });
-  history.undo();
+  await undo();
   expect(members()).toEqual({ Key: ["Main"] });
 });
 
