@@ -6,13 +6,13 @@ the lights of all others are merged into one more source per kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from relume.core.import_warnings import ImporterWarning, approximated, quote
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.light_members import MEMBER_KINDS, members_of
 from relume.scene.model import Light
 from relume.scene.validate import MAX_LIGHTS
@@ -26,7 +26,7 @@ _COLOR_DIGITS = 3  # to which the colors of a source are equal
 def merge_lights(
     lights: Lights, powers: Sequence[float], new_name: Callable[[str], str], warnings: list[ImporterWarning]
 ) -> list[Light]:
-    """Merge lights if a look cannot have them singly; only lights of other kinds may remain beyond its limit.
+    """Merge lights if a look cannot have them singly; suns and emissive materials stay single.
 
     Args:
         lights: lights of a file. powers: power of each, W.
@@ -42,12 +42,31 @@ def merge_lights(
     for kind in (*MEMBER_KINDS, None):
         rest = [light for light in dim if _member_kind(light) == kind]
         merged += [_merge_rest(rest, new_name, warnings)] if kind is not None and rest else rest
+    merged = _without_dimmest(merged, power, warnings)
     of_many = [light for light in merged if light.members is not None]
     if of_many:
         num = sum(len(light.members.position) for light in of_many if light.members is not None)
-        message = f"{num:,} of {len(lights):,} lights were merged into {len(of_many)} sources, which are edited as one"
-        warnings.append(approximated(f"{message} light each, for example {quote(of_many[0].name)}."))
+        sources_text = f"{len(of_many)} source{'s' if len(of_many) > 1 else ''}, for example {quote(of_many[0].name)}"
+        message = (
+            f"{num:,} of {len(lights):,} lights were merged into {sources_text}: each source is edited as one light."
+        )
+        warnings.append(approximated(message))
     return merged
+
+
+def _without_dimmest(lights: list[Light], power: Mapping[str, float], warnings: list[ImporterWarning]) -> list[Light]:
+    """Omit the dimmest lights that cannot be merged, suns and emissive materials, beyond the limit, with a warning."""
+    single = sorted(
+        (light for light in lights if _member_kind(light) is None and light.members is None),
+        key=lambda light: power[light.name],
+    )
+    omitted = single[: max(0, len(lights) - MAX_LIGHTS)]
+    if omitted:
+        message = f"{len(omitted):,} emissive materials or suns, the dimmest, were left out, for example"
+        limit = f"at most {MAX_LIGHTS} are possible."
+        warnings.append(unsupported(f"{message} {quote(omitted[0].name)}; {limit}"))
+    names = {light.name for light in omitted}
+    return [light for light in lights if light.name not in names]
 
 
 def _member_kind(light: Light) -> str | None:
