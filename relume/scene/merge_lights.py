@@ -26,7 +26,7 @@ _COLOR_DIGITS = 3  # to which the colors of a source are equal
 def merge_lights(
     lights: Lights, powers: Sequence[float], new_name: Callable[[str], str], warnings: list[ImporterWarning]
 ) -> list[Light]:
-    """Merge lights if a look cannot have them singly; suns and emissive materials stay single.
+    """Merge lights if a look cannot have them singly; directional lights and emissive materials stay single.
 
     Args:
         lights: lights of a file. powers: power of each, W.
@@ -55,14 +55,14 @@ def merge_lights(
 
 
 def _without_dimmest(lights: list[Light], power: Mapping[str, float], warnings: list[ImporterWarning]) -> list[Light]:
-    """Omit the dimmest lights that cannot be merged, suns and emissive materials, beyond the limit, with a warning."""
+    """Omit the dimmest directional lights and emissive materials beyond the limit, with a warning."""
     single = sorted(
         (light for light in lights if _member_kind(light) is None and light.members is None),
         key=lambda light: power[light.name],
     )
     omitted = single[: max(0, len(lights) - MAX_LIGHTS)]
     if omitted:
-        message = f"{len(omitted):,} emissive materials or suns, the dimmest, were left out, for example"
+        message = f"{len(omitted):,} emissive materials or directional lights, the dimmest, were left out, for example"
         limit = f"at most {MAX_LIGHTS} are possible."
         warnings.append(unsupported(f"{message} {quote(omitted[0].name)}; {limit}"))
     names = {light.name for light in omitted}
