@@ -38,8 +38,8 @@ def point(k: int) -> dict[str, Any]:
     ("name", "prefix"),
     [
         ("Downlight.001", "Downlight"),
-        ("Lamp 2", "Lamp"),
-        ("Lamp_03.001", "Lamp"),
+        ("Bulb 2", "Bulb"),
+        ("Bulb_03.001", "Bulb"),
         ("Key", "Key"),
         ("12", "12"),
         ("", ""),
@@ -51,30 +51,30 @@ def test_prefixes_are_names_without_numbers(name: str, prefix: str) -> None:
 
 def test_lights_of_one_prefix_are_proposed_as_a_group() -> None:
     lights, warnings = collected(
-        [("Lamp", point(0), [1, 1, 1]), ("Lamp.001", point(1), [1, 0, 0]), ("Key", point(2), [1, 1, 1])]
+        [("Bulb", point(0), [1, 1, 1]), ("Bulb.001", point(1), [1, 0, 0]), ("Key", point(2), [1, 1, 1])]
     )
-    assert [light.group for light in lights] == ["Lamp", "Lamp", ""]
+    assert [light.group for light in lights] == ["Bulb", "Bulb", ""]
     assert not warnings
 
 
 def test_as_many_lights_as_a_look_has_stay_single() -> None:
-    lights, warnings = collected([(f"Lamp.{k:03}", point(k), [1, 1, 1]) for k in range(MAX_LIGHTS)])
+    lights, warnings = collected([(f"Bulb.{k:03}", point(k), [1, 1, 1]) for k in range(MAX_LIGHTS)])
     assert all(light.members is None for light in lights)
     assert not warnings
 
 
 def test_one_more_makes_a_source_of_their_group_and_color() -> None:
     intensities = np.linspace(1, 3, MAX_LIGHTS)
-    white = [(f"Lamp.{k:03}", point(k), [i, i, i]) for k, i in enumerate(intensities)]
-    lights, warnings = collected([*white, ("Lamp.red", point(99), [1, 0, 0]), ("Lamp.999", point(98), [2, 0, 0])])
-    assert [light.name for light in lights] == ["Lamp", "Lamp.999", "Lamp.red"]
+    white = [(f"Bulb.{k:03}", point(k), [i, i, i]) for k, i in enumerate(intensities)]
+    lights, warnings = collected([*white, ("Bulb.red", point(99), [1, 0, 0]), ("Bulb.999", point(98), [2, 0, 0])])
+    assert [light.name for light in lights] == ["Bulb", "Bulb.999", "Bulb.red"]
     source = lights[0]
     assert source.members is not None
-    assert source.group == "Lamp"
-    assert source.fields == {"kind": "points", "source": "Lamp", "emission": pytest.approx([2.0] * 3)}
+    assert source.group == "Bulb"
+    assert source.fields == {"kind": "points", "source": "Bulb", "emission": pytest.approx([2.0] * 3)}
     np.testing.assert_allclose(source.members.relative_emission, intensities / intensities.mean(), rtol=1e-6)
     np.testing.assert_array_equal(source.members.position[:, 0], np.arange(MAX_LIGHTS))
-    assert "64 of 66 lights were merged into 1 source, for example “Lamp”" in warnings[0]
+    assert "64 of 66 lights were merged into 1 source, for example “Bulb”" in warnings[0]
     assert warnings[0].severity == "approximated"
 
 
@@ -117,7 +117,7 @@ def test_rectangles_have_their_mean_radiance_by_area() -> None:
 
 
 def test_dark_lights_are_a_source_that_can_be_turned_up() -> None:
-    (source,), _ = collected([(f"Lamp.{k:03}", point(k), [0, 0, 0]) for k in range(70)])
+    (source,), _ = collected([(f"Bulb.{k:03}", point(k), [0, 0, 0]) for k in range(70)])
     assert source.members is not None
     assert source.fields["emission"] == [0, 0, 0]
     assert (source.members.relative_emission == 1).all()

@@ -60,7 +60,7 @@ def expected_irradiance(position: Any, lights: np.ndarray) -> np.ndarray:
 
 
 def pixel_centers(scene: Scene, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which pixels are well inside the quad, and where the rays through their centers meet it."""
+    """Mask of pixels well inside the quad, and the points where the rays through their centers meet it."""
     camera = scene.cameras[0]
     edge = np.tan(camera.yfov / 2) * ((np.arange(side) + 0.5) / side * 2 - 1)
     x, y = np.meshgrid(edge, -edge)
