@@ -40,6 +40,7 @@ def find_document(name: str) -> str:
                 "sharp.speckle",
                 "sharp.static",
                 "sharp.moving",
+                "lights.groups_rmse",
                 "lights.rmse",
                 "solve.error",
                 "free_camera.rmse",

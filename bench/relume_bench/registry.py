@@ -285,6 +285,14 @@ GROUPS = (
         ),
     ),
     Group(
+        "relume_bench.light_groups",
+        (
+            "lights.groups_ms",
+            "lights.groups_rmse_1000",
+            "lights.groups_rmse_10000",
+        ),
+    ),
+    Group(
         "relume_bench.lights",
         (
             "lights.rmse_point",

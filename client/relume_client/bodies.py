@@ -319,13 +319,23 @@ class InspectAnswer(TypedDict):
     bands: Sequence[Sequence[float]] | None
 
 
+class LightGroupLook(TypedDict):
+    """A group of lights: `intensity` and `color` multiply their gains; a disabled group turns them off."""
+
+    lights: NotRequired[Sequence[str]]
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+
+
 class LookDocument(TypedDict):
     """A complete, valid look, made by `relume.look.validate`."""
 
     materials: NotRequired[Mapping[str, MaterialLook]]
     environment: NotRequired[EnvironmentLook]
     background: NotRequired[BackgroundLook]
-    lights: NotRequired[Mapping[str, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook]]
+    lights: NotRequired[Mapping[str, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook | PointsLook | PanelsLook]]
+    light_groups: NotRequired[Mapping[str, LightGroupLook]]
     transport: NotRequired[TransportLook]
     display: NotRequired[DisplayLook]
 
@@ -407,6 +417,19 @@ class OcioView(TypedDict):
     view: NotRequired[str]
 
 
+class PanelsLook(TypedDict):
+    """Many rectangles of the scene as one source, its `source`; emission is their mean radiance."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["panels"]]
+    source: NotRequired[str]
+
+
 class ParameterBody(TypedDict):
     """A numeric parameter that generates curves; `scale` is the scale of its slider."""
 
@@ -467,6 +490,19 @@ class PointLook(TypedDict):
     shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["point"]]
     position: NotRequired[Sequence[float]]
+
+
+class PointsLook(TypedDict):
+    """Many point and spot lights of the scene as one source, its `source`; emission is their mean intensity, W/sr."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["points"]]
+    source: NotRequired[str]
 
 
 class PongMessage(TypedDict):

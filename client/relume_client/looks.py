@@ -180,7 +180,7 @@ class MaterialPart(LookPart):
 
 
 class Look(LookPart):
-    """A look: materials and lights by name, `environment`, `background`, `transport` and `display`.
+    """A look: materials, lights and `light_groups` by name, `environment`, `background`, `transport` and `display`.
 
         look["Teapot"].roughness = 0.3
         look["Teapot"].lambert.color = 0.8, 0.2, 0.1
@@ -266,7 +266,11 @@ def _expand_light_mix(mix: Mapping[str, Any], lights: Mapping[str, Any]) -> dict
         warnings.warn(f"the look has no lights {', '.join(map(repr, missing))}; the others are set", stacklevel=3)
     if differing:
         warnings.warn(f"lights of another kind keep their emission: {', '.join(map(repr, differing))}", stacklevel=3)
-    return {"lights": common, "environment": mix.get("environment", {})}
+    groups = {
+        name: {**group, "lights": [light for light in group["lights"] if light in lights]}
+        for name, group in mix.get("light_groups", {}).items()
+    }
+    return {"lights": common, "light_groups": groups, "environment": mix.get("environment", {})}
 
 
 def _differences(changes: Any, document: Any, path: Path) -> Iterator[Change]:

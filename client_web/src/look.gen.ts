@@ -63,12 +63,21 @@ export interface IncludeLink {
   include: SurfaceNames;
 }
 
+/** A group of lights: `intensity` and `color` multiply their gains; a disabled group turns them off. */
+export interface LightGroupLook {
+  lights: string[];
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+}
+
 /** A complete, valid look, made by `relume.look.validate`. */
 export interface Look {
   materials: Record<string, MaterialLook>;
   environment: EnvironmentLook;
   background: BackgroundLook;
-  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;
+  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook | PointsLook | PanelsLook>;
+  light_groups: Record<string, LightGroupLook>;
   transport: TransportLook;
   display: DisplayLook;
 }
@@ -107,6 +116,18 @@ export interface OcioView {
   view: string;
 }
 
+/** Many rectangles of the scene as one source, its `source`; emission is their mean radiance. */
+export interface PanelsLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "panels";
+  source: string;
+}
+
 /** A point light that emits equally in all directions; emission is radiant intensity, W/sr. */
 export interface PointLook {
   intensity: number;
@@ -117,6 +138,18 @@ export interface PointLook {
   shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "point";
   position: [number, number, number];
+}
+
+/** Many point and spot lights of the scene as one source, its `source`; emission is their mean intensity, W/sr. */
+export interface PointsLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "points";
+  source: string;
 }
 
 /** A rectangular area light that emits toward `direction`; emission is radiance. The camera does not see it. `rotation` rotates it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or of +Z if `direction` is vertical. `size`: width and height, meters. */
@@ -176,7 +209,9 @@ export type LightLook =
   | SpotLook
   | DirectionalLook
   | RectangleLook
-  | MeshLook;
+  | MeshLook
+  | PointsLook
+  | PanelsLook;
 
 type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { kind: K }> };
 
@@ -187,6 +222,8 @@ export const DEFAULT_LIGHTS: LightsByKind = {
   directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, direction: [0, -1, 0] },
   rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
   mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, material: "", image: null },
+  points: { kind: "points", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
+  panels: { kind: "panels", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
 };
 
 export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "transport" | "display">> = {
@@ -210,6 +247,7 @@ export const RANGES = {
 export const MAX_TERMS = 16;
 export const BASIS_FUNCTIONS = [1, 3, 6, 10, 15, 21, 28, 36];
 export const MAX_LIGHTS = 64;
+export const MAX_LIGHT_GROUPS = 64;
 export const MAX_LIGHT_NAME = 80;
 export const MAX_CURVE_POINTS = 4096;
 export const MAX_CURVE_VALUE = 1000000;

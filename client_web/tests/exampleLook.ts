@@ -15,6 +15,7 @@ export const LOOK: Look = {
   environment: { map: null, intensity: 1, color: [1, 1, 1], rotation: 0 },
   background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   lights: {},
+  light_groups: {},
   transport: { show: "all", bounces: 24 },
   display: { exposure: 0, tone_map: "agx" },
 };

@@ -12,7 +12,8 @@ from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial, MaterialExporter
 from relume.look import Look, default_look, validate
 from relume.look.light_mix import expand_light_mix
-from relume.look.model import LightLook, RectangleLook
+from relume.look.model import RectangleLook, SingleLightLook
+from relume.look.single_lights import single_lights
 from relume.scene.model import Scene
 
 MAX_VARIANTS = 100  # as many as imports read
@@ -55,9 +56,9 @@ class ExportDocument:
                 replacements.setdefault(numbers[id(materials[index])], []).append(variant)
         return replacements
 
-    def lights(self) -> Iterator[tuple[str, LightLook]]:
+    def lights(self) -> Iterator[tuple[str, SingleLightLook]]:
         """Lights other than emissive materials; rectangles only if they emit."""
-        for name, light in self.look.lights.items():
+        for name, light in single_lights(self.scene, self.look).items():
             if light.kind != "mesh" and not (isinstance(light, RectangleLook) and max(light.gain) == 0):
                 yield name, light
 

@@ -9,13 +9,13 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.lights.local_lights import rectangle
-from relume.look.model import LightLook, RectangleLook
+from relume.look.model import RectangleLook, SingleLightLook
 from relume.raytrace.tangents import any_tangent
 
 F64 = NDArray[np.float64]
 
 
-def light_frame(light: LightLook) -> Shaped[F64, "4 4"]:
+def light_frame(light: SingleLightLook) -> Shaped[F64, "4 4"]:
     """Return the transform to world of a light other than an emissive mesh, rigid."""
     position = getattr(light, "position", (0.0, 0.0, 0.0))
     if isinstance(light, RectangleLook):

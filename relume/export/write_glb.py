@@ -23,7 +23,7 @@ from relume.export.export_materials import ExportMaterial, emissive_surface
 from relume.export.glb_buffer import INDICES, GlbBuffer
 from relume.export.gltf_materials import GltfMaterials
 from relume.export.light_frames import light_frame
-from relume.look.model import LightLook, RectangleLook
+from relume.look.model import RectangleLook, SingleLightLook
 from relume.raytrace.tangents import any_tangent, unit
 from relume.scene.model import WRAPS, Camera, Mesh
 from relume.scene_io.gltf.lights import EXTENSION as PUNCTUAL
@@ -144,7 +144,7 @@ class _GlbDocument:
             primitive["extensions"] = {VARIANTS: {"mappings": mappings}}
         return primitive
 
-    def _light(self, name: str, light: LightLook) -> dict[str, Any]:
+    def _light(self, name: str, light: SingleLightLook) -> dict[str, Any]:
         """Members of the node of a light; a rectangle is an emissive mesh."""
         if isinstance(light, RectangleLook):
             return {"mesh": self._add_rectangle(name, light)}

@@ -20,7 +20,7 @@ from relume.export.open_pbr_inputs import IMAGE_FOLDER, omitted_from_open_pbr
 from relume.export.usd_light_links import write_links
 from relume.export.usd_materials import UsdMaterials, omitted_from_preview
 from relume.image_io.write_image import write_image
-from relume.look.model import LightLook, RectangleLook
+from relume.look.model import RectangleLook, SingleLightLook
 from relume.raytrace.tangents import unit
 from relume.scene.model import Camera, Mesh
 from relume.scene.unique_names import append_number
@@ -159,7 +159,7 @@ class _StageWriter:
             primvar.Set(Vt.Vec2fArray.FromNumpy(coordinates))
         return prim.GetPrim()
 
-    def _light(self, name: str, light: LightLook) -> Any:
+    def _light(self, name: str, light: SingleLightLook) -> Any:
         from pxr import UsdLux
 
         path, strength = self._path("Lights", name), max(light.gain)

@@ -5,6 +5,8 @@
     point        w = 1 / d²                                        emission W/sr
     spot         w = s² / d²,  s = clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)   (KHR_lights_punctual)
     directional  w = 1                                             emission W/m²
+    points       w = M pm · w of light m, pm = Im / Σ I            emission W/sr, the mean of its M lights
+                 w = M / N · w of light m with more lights than samples, N of them at random by pm
     surface      w = A cos θl / (N d²),  N uniform samples         emission W/m²/sr
 
 A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are stratified and shifted in their strata
@@ -14,12 +16,13 @@ per receiver (`relume.lights.light_sampling`), so that the remaining noise is of
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 from jaxtyping import Shaped
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from relume.lights.light_sampling import (
     EmitterParts,
@@ -39,7 +42,8 @@ POINT, DIRECTIONAL, SURFACE = 0, 1, 2
 _MIN_DISTANCE = np.float32(1e-12)  # meters, from point lights: so that the falloff is finite
 _INFINITE = np.float32(np.inf)
 _SEED = 1
-_SAMPLE_FACTORS = {"rectangle": 1, "mesh": 4}  # most samples of a mesh face away from a point, or are far from it
+_AREA_FACTOR = 4  # of samples: most of a mesh face away from a point, or are far from it, like most of many lights
+_SAMPLE_FACTORS = {"rectangle": 1, "mesh": _AREA_FACTOR, "panels": _AREA_FACTOR, "points": _AREA_FACTOR}
 _PI = np.float32(math.pi)
 _MIN_CONE_COSINES = 1e-3  # difference of cosines, as in KHR_lights_punctual
 _PARALLEL_TOLERANCE = 1e-6
@@ -50,8 +54,9 @@ class LocalLight(NamedTuple):
 
     Attributes:
         kind: `POINT` (spots too), `DIRECTIONAL` or `SURFACE`.
-        position: position of point lights. axis: unit axis of spots; direction of travel of directional light.
+        position: positions of point lights, meters. axis: unit axes of spots; direction of travel of directional light.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
+        intensity_cdf: cumulative intensity of the point lights.
         corner, edges, normal: corner, edges and normals of parallelograms or triangles; unit normals.
         end_offset: of ray ends from the pieces, see `relume.math.plane_rounding.end_offsets`.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
@@ -59,10 +64,11 @@ class LocalLight(NamedTuple):
     """
 
     kind: int
-    position: Shaped[F32, " 3"]
-    axis: Shaped[F32, " 3"]
-    cone_scale: np.float32
-    cone_offset: np.float32
+    position: Shaped[F32, "M 3"]
+    axis: Shaped[F32, "M 3"]
+    cone_scale: Shaped[F32, " M"]
+    cone_offset: Shaped[F32, " M"]
+    intensity_cdf: Shaped[F32, " M"]
     corner: Shaped[F32, "T 3"]
     edges: Shaped[F32, "T 2 3"]
     normal: Shaped[F32, "T 3"]
@@ -86,16 +92,36 @@ class LightTriangles(NamedTuple):
     is_two_sided: bool
 
 
+class LightPoints(NamedTuple):
+    """Point and spot lights of one source.
+
+    Attributes:
+        position: meters. direction: of any length, meters. cone: half-angles, degrees; 180° for a point light.
+        relative_intensity: intensity of each over the mean of all.
+    """
+
+    position: Shaped[F32, "M 3"]
+    direction: Shaped[F32, "M 3"]
+    cone: Shaped[F32, "M 2"]
+    relative_intensity: Shaped[F32, " M"]
+
+
 def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
-    """Return the number of samples of a light, given that of a rectangle."""
+    """Return the largest number of samples of a light, given that of a rectangle."""
     return _SAMPLE_FACTORS.get(geometry.kind, 0) * num_rectangle_samples or 1
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
-    """Create the samples of a light. num_rectangle_samples: samples of a rectangle, a power of four"""
-    factor = _SAMPLE_FACTORS["rectangle" if light.is_rectangle else "mesh"]
-    num_light_samples = factor * num_rectangle_samples if light.kind == SURFACE else 1
-    return make_strata(split_axes(len(light.power_cdf), num_light_samples), _SEED)
+    """Create the samples of a light: each of its points if they are not more than the samples.
+
+    Args:
+        num_rectangle_samples: samples of a rectangle, a power of four.
+    """
+    num_samples, num_points = num_rectangle_samples * (1 if light.is_rectangle else _AREA_FACTOR), len(light.position)
+    if light.kind != SURFACE and num_points <= num_samples:
+        zeros = np.zeros((num_points, 2), np.float32)
+        return LightStrata(zeros, np.ones(2, np.float32), zeros, _SEED)
+    return make_strata(split_axes(max(len(light.power_cdf), len(light.intensity_cdf)), num_samples), _SEED)
 
 
 def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
@@ -104,8 +130,16 @@ def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
     return subdivide_emitter(split_axis, light.corner, light.edges, light.power_cdf, is_rectangle=light.is_rectangle)
 
 
-def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | None = None) -> LocalLight:
-    """Prepare a light of a look. triangles: triangles of a light of kind "mesh"; without area it emits nothing."""
+def prepare_local_lights(
+    geometry: LightGeometry, triangles: LightTriangles | None = None, points: LightPoints | None = None
+) -> LocalLight:
+    """Prepare a light of a look.
+
+    Args:
+        geometry: geometry of the light.
+        triangles: triangles of a light of kind "mesh" or "panels"; without area it emits nothing.
+        points: the lights of kind "points".
+    """
     is_rectangle = geometry.kind == "rectangle"
     corner, edges = _outline(geometry, triangles)
     piece_normals = np.cross(edges[:, 0], edges[:, 1])
@@ -115,13 +149,10 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
     pieces, area = np.flatnonzero(areas > 0), areas.sum()
     pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
     piece_normals = piece_normals[pieces] / np.linalg.norm(piece_normals[pieces], axis=1, keepdims=True)
-    scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)
+    kind = {"point": POINT, "spot": POINT, "points": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE)
     return LocalLight(
-        kind={"point": POINT, "spot": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE),
-        position=np.array(geometry.position, np.float32),
-        axis=_unit(geometry.direction).astype(np.float32),
-        cone_scale=np.float32(scale),
-        cone_offset=np.float32(offset),
+        kind,
+        **_point_fields(_single_point(geometry) if points is None else points),
         corner=corner[pieces].astype(np.float32),
         edges=edges[pieces].astype(np.float32),
         normal=piece_normals.astype(np.float32),
@@ -131,6 +162,28 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
         is_rectangle=is_rectangle,
         is_two_sided=triangles is not None and triangles.is_two_sided,
     )
+
+
+def _single_point(geometry: LightGeometry) -> LightPoints:
+    cone = geometry.cone if geometry.kind == "spot" else (180.0, 180.0)
+    position, direction, cone_angles = (
+        np.array([field], np.float32) for field in (geometry.position, geometry.direction, cone)
+    )
+    return LightPoints(position, direction, cone_angles, np.ones(1, np.float32))
+
+
+def _point_fields(points: LightPoints) -> dict[str, F32]:
+    """Fields of `LocalLight` for points, along a Morton curve, so that samples are stratified in space."""
+    order = morton_order(points.position.astype(np.float64))
+    scale, offset = _cones(points.cone[order].astype(np.float64))
+    intensity = np.cumsum(points.relative_intensity[order].astype(np.float64))
+    return {
+        "position": points.position[order],
+        "axis": np.array([_unit(direction) for direction in points.direction[order]], np.float32),
+        "cone_scale": scale.astype(np.float32),
+        "cone_offset": offset.astype(np.float32),
+        "intensity_cdf": (intensity / intensity[-1]).astype(np.float32),
+    }
 
 
 def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
@@ -167,17 +220,28 @@ def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, " 3"], Shaped[F64, "
     return np.array(geometry.position, np.float64) - edges.sum(axis=0) / 2, edges
 
 
-def _unit(direction: tuple[float, float, float]) -> F64:
+def panel_triangles(panels: Sequence[Mapping[str, Any]]) -> LightTriangles:
+    """Return rectangles as triangles, two each. panels: fields as in a look, with an emission of one channel"""
+    corners = []
+    for panel in panels:
+        shape = {field: panel[field] for field in ("kind", "position", "direction", "rotation", "size")}
+        corner, (e, f) = rectangle(LightGeometry(**shape))
+        corners += [(corner, corner + e, corner + e + f), (corner, corner + e + f, corner + f)]
+    radiance = np.repeat([panel["emission"][0] for panel in panels], 2)
+    return LightTriangles(np.array(corners, np.float32), radiance.astype(np.float32), is_two_sided=False)
+
+
+def _unit(direction: ArrayLike) -> F64:
     vector = np.array(direction, np.float64)
     vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not underflow
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def _cone(inner: float, outer: float) -> tuple[float, float]:
-    """Return scale and offset of the falloff between two half-angles in degrees."""
-    cos_outer = math.cos(math.radians(outer))
-    scale = 1 / max(_MIN_CONE_COSINES, math.cos(math.radians(inner)) - cos_outer)
-    return scale, -cos_outer * scale
+def _cones(cone: Shaped[F64, "M 2"]) -> tuple[F64, F64]:
+    """Return scales and offsets of the falloff between two half-angles in degrees; 0 and 1 without a cone."""
+    cos_inner, cos_outer = np.cos(np.radians(cone)).T
+    scale = np.where(cone[:, 1] > 90, 0, 1 / np.maximum(_MIN_CONE_COSINES, cos_inner - cos_outer))
+    return scale, np.where(cone[:, 1] > 90, 1, -cos_outer * scale)
 
 
 # inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
@@ -195,15 +259,24 @@ def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: 
     """
     zero, unity = np.float32(0), np.float32(1)
     if light.kind == DIRECTIONAL:
-        return -light.axis[0], -light.axis[1], -light.axis[2], _INFINITE, unity, zero, zero, zero, zero
+        return -light.axis[0, 0], -light.axis[0, 1], -light.axis[0, 2], _INFINITE, unity, zero, zero, zero, zero
     if light.kind == POINT:
-        dx, dy, dz = light.position[0] - px, light.position[1] - py, light.position[2] - pz
+        num_points, num_samples = light.position.shape[0], strata.uv.shape[0]
+        point, scale = sample, np.float32(num_points) / np.float32(num_samples)
+        if num_samples != num_points:
+            u = strata.uv[sample, 0] + shift_u
+            u = strata.corner[sample, 0] + strata.size[0] * (u - np.float32(u >= unity))
+            point = min(np.searchsorted(light.intensity_cdf, u, side="right"), num_points - 1)
+        elif num_points > 1:
+            start = light.intensity_cdf[point - 1] if point > 0 else zero
+            scale = np.float32(num_points) * (light.intensity_cdf[point] - start)
+        dx, dy, dz = light.position[point, 0] - px, light.position[point, 1] - py, light.position[point, 2] - pz
         distance = max(np.float32(math.sqrt(dx * dx + dy * dy + dz * dz)), _MIN_DISTANCE)
         inverse_distance = unity / distance
         dx, dy, dz = dx * inverse_distance, dy * inverse_distance, dz * inverse_distance
-        along = -(dx * light.axis[0] + dy * light.axis[1] + dz * light.axis[2])
-        falloff = min(max(light.cone_scale * along + light.cone_offset, zero), unity)
-        return dx, dy, dz, distance, falloff * falloff / (distance * distance), zero, zero, zero, zero
+        along = -(dx * light.axis[point, 0] + dy * light.axis[point, 1] + dz * light.axis[point, 2])
+        falloff = min(max(light.cone_scale[point] * along + light.cone_offset[point], zero), unity)
+        return dx, dy, dz, distance, scale * falloff * falloff / (distance * distance), zero, zero, zero, zero
     if light.area == 0:
         return unity, zero, zero, unity, zero, zero, zero, zero, zero
     u, v = strata.uv[sample, 0] + shift_u, strata.uv[sample, 1] + shift_v

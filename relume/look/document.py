@@ -20,6 +20,7 @@ from relume.core.validation import (
 )
 from relume.image_io.ocio.view import MAX_NAME
 from relume.look.glass import complete_glass, default_glass
+from relume.look.light_groups import complete_light_groups, default_light_groups
 from relume.look.light_mix import expand_light_mix
 from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
 from relume.look.link_validation import check_link
@@ -63,6 +64,7 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
         "environment": dict(DEFAULTS["environment"]),
         "background": dict(DEFAULTS["background"]),
         "lights": default_lights(scene_lights, [material.name for material in scene_materials]),
+        "light_groups": default_light_groups(scene_lights),
         "transport": dict(DEFAULTS["transport"]),
         "display": dict(DEFAULTS["display"]),
     }
@@ -98,14 +100,17 @@ def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping
         ParameterError: as `complete` does.
     """
     check_object((), partial, _SECTIONS)
+    lights = complete_lights(partial.get("lights", {}), default["lights"], previous["lights"], default["materials"])
+    default_groups = default.get("light_groups", {})  # older stores have no groups
     return {
         "materials": _complete_materials(partial.get("materials", {}), default["materials"], previous["materials"]),
         "environment": _complete_environment(
             partial.get("environment", {}), default["environment"], previous["environment"], default["materials"]
         ),
         "background": _complete_background(partial.get("background", {}), default.get("background", {})),
-        "lights": complete_lights(
-            partial.get("lights", {}), default["lights"], previous["lights"], default["materials"]
+        "lights": lights,
+        "light_groups": complete_light_groups(
+            partial.get("light_groups", default_groups), default_groups, previous.get("light_groups", {}), lights
         ),
         "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
         "display": _complete_display(partial.get("display", {}), default["display"]),

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from relume.brdf.registry import TERMS
+from relume.look.light_groups import without_light_groups
 from relume.look.light_validation import MIN_DIRECTION
 
 InterpolationMode = Literal["parameters", "map", "map_low"]
@@ -52,7 +53,7 @@ def interpolate_looks(
     first, second, weight = enclosing_keyframes(len(looks), fraction)
     if first == second:
         return looks[first]
-    start, end = looks[first], looks[second]
+    start, end = _with_equal_groups(looks[first], looks[second])
     interpolated: Mapping[str, Any] = _interpolate(start, end, weight)
     if mode != "parameters":
         from relume.look.library.navigation_path import path_on_map  # imports SciPy, slow and rarely needed
@@ -65,6 +66,12 @@ def interpolate_looks(
                 )
                 interpolated["materials"][name] = {**material, "terms": terms}
     return interpolated
+
+
+def _with_equal_groups(*ends: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
+    """Ends with the same light groups, whose gains are interpolated; in ends with others the lights have their gain."""
+    members = [{name: tuple(group["lights"]) for name, group in look["light_groups"].items()} for look in ends]
+    return ends if members[0] == members[1] else tuple(map(without_light_groups, ends))
 
 
 def _interpolate(start: Any, end: Any, weight: float) -> Any:

@@ -20,6 +20,8 @@ UNITS = {
     "directional": "W/m²",
     "rectangle": "W/(sr·m²)",
     "mesh": "W/(sr·m²)",
+    "points": "W/sr",
+    "panels": "W/(sr·m²)",
 }
 """Units of `emission` by the kind of light."""
 _FIELDS = {"intensity", "color", "enabled", "emission"}
@@ -34,6 +36,7 @@ def make_light_mix(look: Look, scene_name: str) -> dict[str, Any]:
         "units": UNITS,
         "kinds": {name: light.kind for name, light in look.lights.items()},
         "lights": {name: light.model_dump(mode="json", include=_FIELDS) for name, light in look.lights.items()},
+        "light_groups": {name: group.model_dump(mode="json") for name, group in look.light_groups.items()},
         "environment": look.environment.model_dump(mode="json", exclude={"link"}),
     }
 
@@ -54,7 +57,8 @@ def expand_light_mix(document: Any, default: Mapping[str, Any]) -> tuple[Any, li
         raise invalid_value(("version",), document.get("version"), f"{VERSION}, the version of light mixes")
     lights, light_warnings = _expand_lights(document, default["lights"])
     environment, environment_warnings = _expand_environment(document.get("environment", {}))
-    return {"lights": lights, "environment": environment}, [*light_warnings, *environment_warnings]
+    partial = {"lights": lights, **_expand_light_groups(document, default["lights"]), "environment": environment}
+    return partial, [*light_warnings, *environment_warnings]
 
 
 def _expand_lights(mix: Mapping[str, Any], scene_lights: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -72,6 +76,19 @@ def _expand_lights(mix: Mapping[str, Any], scene_lights: Mapping[str, Any]) -> t
             f"These lights are of another kind in the scene and keep its emission: {names_text(differing)}."
         )
     return common, warnings
+
+
+def _expand_light_groups(mix: Mapping[str, Any], scene_lights: Mapping[str, Any]) -> dict[str, Any]:
+    """Groups of the lights that the scene has; empty if the light mix, of an earlier version, has none."""
+    if "light_groups" not in mix:
+        return {}
+    groups = {
+        name: {**group, "lights": [light for light in group["lights"] if light in scene_lights]}
+        if isinstance(group, Mapping) and isinstance(group.get("lights"), list)
+        else group
+        for name, group in _object(mix, "light_groups").items()
+    }
+    return {"light_groups": groups}
 
 
 def _expand_environment(environment: Any) -> tuple[Any, list[str]]:

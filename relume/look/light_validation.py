@@ -17,6 +17,7 @@ from relume.core.validation import (
     names_text,
 )
 from relume.look.link_validation import check_link
+from relume.scene.light_members import MEMBER_KINDS
 from relume.scene.model import Light
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
 
@@ -50,7 +51,9 @@ _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
     "directional": _DIRECTION,
     "rectangle": {**_POSITION, **_DIRECTION, "rotation": 0.0, "size": [0.5, 0.5]},
     "mesh": {"material": "", "image": None},
+    **{kind: {"source": ""} for kind in MEMBER_KINDS},
 }
+_SCENE_KINDS = ("mesh", *MEMBER_KINDS)  # where these lights are is of the scene
 
 
 def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> dict[str, Any]:
@@ -131,9 +134,9 @@ def _base_fields(pointer: Pointer, partial: Mapping[str, Any], default: Mapping[
     kind = partial.get("kind", default["kind"] if default else None)
     if default is not None and kind == default["kind"]:
         return {**default_light(kind), **default}  # older stores lack some fields
-    if default is not None and default["kind"] == "mesh":
-        raise invalid_value((*pointer, "kind"), kind, "'mesh' for this emissive mesh; add a light with another name")
-    kinds = [name for name in _KIND_DEFAULTS if default is None or name != "mesh"]
+    if default is not None and default["kind"] in _SCENE_KINDS:
+        raise invalid_value((*pointer, "kind"), kind, f"{default['kind']!r}; add a light with another name")
+    kinds = [name for name in _KIND_DEFAULTS if name not in (MEMBER_KINDS if default is None else _SCENE_KINDS)]
     if kind not in kinds:
         raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(kinds)}")
     return default_light(kind)
@@ -176,6 +179,9 @@ def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, An
         case "material":
             if base["material"] not in ("", value):
                 raise invalid_value(pointer, value, f"{base['material']!r}: the scene decides which mesh emits")
+        case "source":
+            if base["source"] not in ("", value):
+                raise invalid_value(pointer, value, f"{base['source']!r}: the scene decides which lights it has")
         case "image":
             if value is not None:
                 check_image(pointer, value)

@@ -5,9 +5,9 @@ Terms stay dictionaries, so that `relume.brdf.curves` handles looks and their JS
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, NotRequired
+from typing import Annotated, Literal, NamedTuple, NotRequired, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic.dataclasses import dataclass
 from typing_extensions import TypedDict  # pydantic requires it before Python 3.12
 
@@ -16,7 +16,7 @@ from relume.image_io.ocio.view import OcioView
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
-LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
+LightKind = Literal["point", "spot", "directional", "rectangle", "mesh", "points", "panels"]
 ToneMap = Literal["agx", "filmic", "none"]
 PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
@@ -175,7 +175,8 @@ class EnvironmentLook(_FrozenModel):
 
 class LightGeometry(NamedTuple):
     """Position and shape of a local light; fields that its kind lacks have their defaults. Lights with equal geometry
-    differ only by a factor for each channel. Fields as in the look; `channel`: the one of RGB that it emits, as a part
+    differ only by a factor for each channel. Fields as in the look; `source`: name of a source of several lights in the
+    scene; `channel`: the one of RGB that it emits, as a part
     of a light that emits a colored image."""
 
     kind: LightKind
@@ -186,9 +187,19 @@ class LightGeometry(NamedTuple):
     size: tuple[float, float] = (0.0, 0.0)
     material: str = ""
     image: str | None = None
+    source: str = ""
     channel: int | None = None
     link: Link | None = None
     shadow_link: Link | None = None
+
+
+class LightGroupLook(_FrozenModel):
+    """A group of lights: `intensity` and `color` multiply their gains; a disabled group turns them off."""
+
+    lights: tuple[str, ...]
+    intensity: float
+    color: Rgb
+    enabled: bool
 
 
 class _LightLook(_FrozenModel):
@@ -203,12 +214,21 @@ class _LightLook(_FrozenModel):
     emission: Rgb
     link: Link | None = None
     shadow_link: Link | None = None
+    _group: LightGroupLook | None = PrivateAttr(None)
 
     @property
     def gain(self) -> Rgb:
-        """Factor of each channel of a light with unit emission: intensity · color · emission; zero if disabled."""
-        scale = self.intensity if self.enabled else 0.0
-        red, green, blue = (scale * c * e for c, e in zip(self.color, self.emission, strict=True))
+        """Factor of each channel of a light with unit emission, `full_gain`; zero if it or its group is disabled."""
+        is_enabled = self.enabled and (self._group is None or self._group.enabled)
+        return self.full_gain if is_enabled else (0.0, 0.0, 0.0)
+
+    @property
+    def full_gain(self) -> Rgb:
+        """Factor of each channel of an enabled light: intensity · color · emission, and those of its group."""
+        gain = [self.intensity * c * e for c, e in zip(self.color, self.emission, strict=True)]
+        if self._group is not None:
+            gain = [self._group.intensity * c * g for c, g in zip(self._group.color, gain, strict=True)]
+        red, green, blue = gain
         return red, green, blue
 
     @property
@@ -266,7 +286,22 @@ class MeshLook(_LightLook):
     image: str | None = None
 
 
-LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]
+class PointsLook(_LightLook):
+    """Many point and spot lights of the scene as one source, its `source`; emission is their mean intensity, W/sr."""
+
+    kind: Literal["points"]
+    source: str
+
+
+class PanelsLook(_LightLook):
+    """Many rectangles of the scene as one source, its `source`; emission is their mean radiance."""
+
+    kind: Literal["panels"]
+    source: str
+
+
+SingleLightLook = PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook
+LightLook = Annotated[SingleLightLook | PointsLook | PanelsLook, Field(discriminator="kind")]
 
 
 _MANY_BOUNCES = 8  # later ones bring hardly any light
@@ -347,8 +382,16 @@ class Look(_FrozenModel):
     environment: EnvironmentLook
     background: BackgroundLook
     lights: dict[str, LightLook]
+    light_groups: dict[str, LightGroupLook]
     transport: TransportLook
     display: DisplayLook
+
+    @model_validator(mode="after")
+    def _group_lights(self) -> Self:
+        for group in self.light_groups.values():
+            for name in group.lights:
+                self.lights[name]._group = group
+        return self
 
     def without_compositing(self) -> Look:
         """The look without shadow catchers and with the environment as background, as the reference renders it."""

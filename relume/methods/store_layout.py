@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from relume.lights.spherical_triangles import TriangleLights
 from relume.raytrace.alpha_filter import AlphaTest
 from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks
 from relume.raytrace.visibility_masks import RayCounts
+from relume.scene.light_members import LightMembers
 from relume.store.bake_protocol import StoreReader
 
 F32 = NDArray[np.float32]
@@ -44,6 +46,16 @@ def read_shadow_ray_directions(store: StoreReader) -> Shaped[F32, "M 3"]:
     if store.attributes["relightable"]:
         return read_tiles(store).centroids.astype(np.float32)
     return read_lights(store).direction
+
+
+def light_members_path(name: str) -> str:
+    """Return the array of a store that has the members of a light; names of lights may have any characters."""
+    return f"scene/light_members/{hashlib.sha256(name.encode()).hexdigest()[:16]}"
+
+
+def read_light_members(store: StoreReader, name: str) -> LightMembers:
+    """Return the members of a light. Raises StoreError if the store has none."""
+    return LightMembers.from_rows(np.asarray(store.read(light_members_path(name)), np.float32))
 
 
 def has_alpha_tested_surfaces(store: StoreReader) -> bool:

@@ -44,7 +44,7 @@ from relume.lights.sphere_tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
 from relume.methods import plan_estimates
 from relume.methods.read_cache import ReadCache
-from relume.methods.store_layout import SHARD_ROWS, read_lights, read_shadow_ray_directions
+from relume.methods.store_layout import SHARD_ROWS, light_members_path, read_lights, read_shadow_ray_directions
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
 from relume.raytrace.visibility_masks import LightTargets, make_light_targets, trace_visibility_masks
 from relume.scene.emission import has_emission_images, relative_emission
@@ -274,6 +274,9 @@ def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[A
     arrays |= {"scene/normals": geometry.normals.astype(np.float16), "scene/uvs": geometry.uvs}
     if has_emission_images(scene):
         arrays["scene/face_emission"] = relative_emission(scene)
+    arrays |= {
+        light_members_path(light.name): light.members.rows() for light in scene.lights if light.members is not None
+    }
     alpha_test = geometry.embree.alpha_test
     if alpha_test is not None:
         arrays |= {f"alpha_masks/{k}": array for k, array in alpha_test.alpha_masks._asdict().items()}

@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import ArrayLike, NDArray
 
-from relume.look import LightLook, Look
-from relume.look.model import DirectionalLook, MeshLook, RectangleLook, SpotLook
+from relume.look import Look
+from relume.look.model import DirectionalLook, MeshLook, RectangleLook, SingleLightLook, SpotLook
+from relume.look.single_lights import single_lights
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
@@ -47,7 +48,7 @@ class ReferenceEmitter:
         casters: the triangles that cast its shadows. lit_meshes: those that it lights; None: all.
     """
 
-    look: LightLook
+    look: SingleLightLook
     triangles: Shaped[F64, "T 3 3"]
     is_two_sided: bool
     uvs: Shaped[F64, "T 3 2"]
@@ -114,7 +115,7 @@ class ReferenceEmitter:
 def emitters(scene: Scene, geometry: SceneBuffers, look: Look) -> list[ReferenceEmitter]:
     """Collect the local lights of a look that emit light. geometry: triangles of the scene"""
     local_lights = []
-    for light in look.lights.values():
+    for light in single_lights(scene, look).values():
         triangles, uvs, is_two_sided, image = np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), False, None
         if isinstance(light, MeshLook):
             material = next(k for k, m in enumerate(scene.materials) if m.name == light.material)

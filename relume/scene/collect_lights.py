@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote
 from relume.scene.emission import normalize_emission
+from relume.scene.light_prefix import name_prefix
+from relume.scene.merge_lights import merge_lights
 from relume.scene.model import Light, Material, Mesh
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHTS
@@ -24,25 +28,33 @@ class LightCollector:
     def __init__(self, warnings: list[ImporterWarning]) -> None:
         self._warnings = warnings
         self._names: dict[str, int] = {}
+        self._instance_groups: dict[int, str] = {}
         self.lights: list[Light] = []
 
     def name(self, preferred: str) -> str:
         """Return a name that no other light of the file has."""
         return unique_name(preferred, self._names)
 
-    def add(self, name: str, fields: Mapping[str, Any], emission: Shaped[F64, " 3"]) -> None:
+    def add(
+        self, name: str, fields: Mapping[str, Any], emission: Shaped[F64, " 3"], *, instance: int | None = None
+    ) -> None:
         """Add a light; its emission is clamped to the limit of a look.
 
         Args:
             name: from `name`, so that it is unique.
             fields: `kind` and all fields that differ from its defaults, without the emission.
             emission: linear RGB in the unit of the kind.
+            instance: number of the light of the file, which several nodes may share; they are proposed as one group.
         """
         if emission.max() > MAX_EMISSION:
             self._warnings.append(
                 approximated(f"Light {quote(name)} was clamped to the maximum emission {MAX_EMISSION:g}.")
             )
-        self.lights.append(Light(name, {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}))
+        fields = {**fields, "emission": np.clip(emission, 0, MAX_EMISSION).tolist()}
+        group = name_prefix(name)
+        self.lights.append(
+            Light(name, fields, group if instance is None else self._instance_groups.setdefault(instance, group))
+        )
 
     def emissive_light(
         self, materials: Sequence[Material], emissions: Sequence[Shaped[F64, " 3"]], meshes: Sequence[Mesh]
@@ -74,21 +86,16 @@ class LightCollector:
             else:
                 reason = "its emission texture is black there" if emitting_meshes else "no surface uses it"
                 self._warnings.append(ignored(f"Emissive material {quote(material.name)} emits no light: {reason}."))
-        self._limit(materials, meshes)
+        self._merge(materials, meshes)
         return tuple(lit_materials)
 
-    def _limit(self, materials: Sequence[Material], meshes: Sequence[Mesh]) -> None:
-        """Omit the dimmest lights beyond the limit of a look, with a warning."""
-        num_omitted = len(self.lights) - MAX_LIGHTS
-        if num_omitted <= 0:
-            return
-        powers = light_powers(self.lights, materials, meshes)
-        ranking = sorted(range(len(powers)), key=lambda number: -powers[number])
-        omitted = set(ranking[MAX_LIGHTS:])
-        example = quote(self.lights[ranking[MAX_LIGHTS]].name)
-        message = f"{num_omitted:,} of {len(self.lights):,} lights, the dimmest, were left out, for example {example};"
-        self._warnings.append(unsupported(f"{message} at most {MAX_LIGHTS} are possible, with emissive materials."))
-        self.lights = [light for number, light in enumerate(self.lights) if number not in omitted]
+    def _merge(self, materials: Sequence[Material], meshes: Sequence[Mesh]) -> None:
+        """Group lights of one prefix or instance, and merge those beyond the limit of a look."""
+        num_lights = Counter(light.group for light in self.lights)
+        lights = [light if num_lights[light.group] > 1 else replace(light, group="") for light in self.lights]
+        if len(lights) > MAX_LIGHTS:
+            lights = merge_lights(lights, light_powers(lights, materials, meshes), self.name, self._warnings)
+        self.lights = lights
 
 
 def light_powers(lights: Sequence[Light], materials: Sequence[Material], meshes: Sequence[Mesh]) -> list[float]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
 from relume.core.import_warnings import ImporterWarning
+from relume.scene.light_members import LightMembers
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -163,10 +164,14 @@ class Light:
 
     Attributes:
         fields: `kind` and all fields that differ from its defaults, as in a look document.
+        group: light group that the default look proposes; "" for none.
+        members: the lights of a source of many; None for a single light.
     """
 
     name: str
     fields: dict[str, Any]
+    group: str = ""
+    members: LightMembers | None = None
 
 
 @dataclass(frozen=True)

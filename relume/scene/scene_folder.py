@@ -19,6 +19,7 @@ from relume.assets.environments.environment import Environment
 from relume.core.errors import NotFoundError, SceneError
 from relume.core.filesystem import atomic_write
 from relume.core.import_warnings import ImporterWarning, warning_of
+from relume.scene.light_members import LightMembers
 from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
 from relume.scene.validate import check_scene
 
@@ -172,6 +173,9 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         arrays |= {f"material{i}_{channel}": texture.pixels for channel, texture in _textures(material)}
         if material.opacity is not None:
             arrays[f"material{i}_opacity"] = material.opacity.alpha
+    for i, light in enumerate(scene.lights):
+        if light.members is not None:
+            arrays[f"light{i}_members"] = light.members.rows()
     document = {
         "format": FORMAT_VERSION,
         "name": scene.name,
@@ -199,7 +203,10 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     if scene.variants:
         document["variants"] = scene.variants
     if scene.lights:
-        document["lights"] = [{"name": light.name, "fields": light.fields} for light in scene.lights]
+        document["lights"] = [
+            {"name": light.name, "fields": light.fields, **({"group": light.group} if light.group else {})}
+            for light in scene.lights
+        ]
     if any(scene.offset):
         document["offset"] = list(scene.offset)
     if scene.import_options:
@@ -232,10 +239,16 @@ def _from_document(document: dict[str, Any], arrays: Arrays) -> Scene:
         Environment(str(document["environment"]["name"]), arrays["environment"]),
         tuple(warning_of(warning) for warning in document["warnings"]),
         {str(name): dict(look) for name, look in document.get("variants", {}).items()},
-        tuple(Light(str(light["name"]), dict(light["fields"])) for light in document.get("lights", ())),
+        tuple(_assemble_light(i, light, arrays) for i, light in enumerate(document.get("lights", ()))),
         _offset(document),
         {str(key): str(value) for key, value in document.get("import_options", {}).items()},
     )
+
+
+def _assemble_light(i: int, document: dict[str, Any], arrays: Arrays) -> Light:
+    rows = arrays.get(f"light{i}_members")
+    members = None if rows is None else LightMembers.from_rows(rows)
+    return Light(str(document["name"]), dict(document["fields"]), str(document.get("group", "")), members)
 
 
 def _offset(document: dict[str, Any]) -> tuple[float, float, float]:

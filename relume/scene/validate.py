@@ -8,6 +8,7 @@ import numpy as np
 
 from relume.assets.environments.environment import Environment
 from relume.core.errors import SceneError
+from relume.scene.light_members import MAX_MEMBERS
 from relume.scene.model import WRAPS, Camera, Light, Material, Mesh
 
 MAX_TRIANGLES = 20_000_000
@@ -99,6 +100,8 @@ def check_lights(lights: Sequence[Light]) -> None:
         raise SceneError(
             f"the scene has {len(lights):,} lights, the limit is {MAX_LIGHTS}; remove the least important ones"
         )
+    if sum(len(light.members.position) for light in lights if light.members is not None) > MAX_MEMBERS:
+        raise SceneError(f"the sources of the scene have more than {MAX_MEMBERS:,} lights; remove the least important")
     names = [light.name for light in lights]
     if len(set(names)) != len(names) or not all(1 <= len(name) <= MAX_LIGHT_NAME for name in names):
         raise SceneError(f"the names of lights must be unique and have 1 to {MAX_LIGHT_NAME} characters; rename them")

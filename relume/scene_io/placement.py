@@ -114,7 +114,13 @@ def _place_light(light: Light, rotation: F64, meters: float, origin: F64) -> Lig
         fields["direction"] = (rotation @ np.array(fields["direction"])).tolist()
     if "size" in fields:
         fields["size"] = [side * meters for side in fields["size"]]
-    return replace(light, fields=fields)
+    members = light.members
+    if members is not None:
+        position = (meters * (members.position.astype(np.float64) - origin) @ rotation.T).astype(np.float32)
+        direction = (members.direction @ rotation.T).astype(np.float32)
+        size = (members.size * meters).astype(np.float32)
+        members = members._replace(position=position, direction=direction, size=size)
+    return replace(light, fields=fields, members=members)
 
 
 def _place_material(material: Material, meters: float) -> Material:

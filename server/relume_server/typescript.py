@@ -21,6 +21,7 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look import LightLook, Look
 from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
 from relume.look.glass import GLASS_RANGES
+from relume.look.light_groups import MAX_LIGHT_GROUPS
 from relume.look.light_validation import LIGHT_RANGES, default_light
 from relume.look.model import BasisFunctions
 from relume.look.patch import MAX_OPERATIONS
@@ -188,6 +189,7 @@ _CONSTANTS = {
     "MAX_TERMS": MAX_TERMS,
     "BASIS_FUNCTIONS": get_args(BasisFunctions),
     "MAX_LIGHTS": MAX_LIGHTS,
+    "MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS,
     "MAX_LIGHT_NAME": MAX_LIGHT_NAME,
     "MAX_CURVE_POINTS": MAX_POINTS,
     "MAX_CURVE_VALUE": MAX_CURVE_VALUE,

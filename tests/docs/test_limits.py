@@ -17,7 +17,7 @@ from relume.lights import sphere_tiles
 from relume.look import document, patch
 from relume.methods import plan_estimates
 from relume.methods import view_stages as direct
-from relume.scene import validate
+from relume.scene import light_members, validate
 from relume.scene_io import import_scene, referenced_files, zip_scene
 from relume.scene_io.surfaces.make_material import MAX_TEXTURE_TEXELS
 from relume_server.io import comment_images
@@ -39,7 +39,7 @@ def maximum(field: str) -> int:
 ROWS = {
     "triangles of a scene": f"{validate.MAX_TRIANGLES // MILLION} million",
     "materials of a scene; terms of a material": f"{validate.MAX_MATERIALS:,}; {document.MAX_TERMS}",
-    "local lights of a scene": f"{validate.MAX_LIGHTS}",
+    "local lights of a scene; lights in its sources of many": f"{validate.MAX_LIGHTS}; {light_members.MAX_MEMBERS:,}",
     "scene file; its referenced files together; files in a `.zip`": (
         f"{import_scene.MAX_FILE_BYTES // MIB} MiB; {referenced_files.MAX_BYTES // MIB} MiB; {zip_scene.MAX_ENTRIES:,}"
     ),

@@ -99,28 +99,44 @@ def test_equal_light_names_are_made_unique_and_ranges_give_a_warning() -> None:
     assert len([warning for warning in scene.warnings if "range" in warning]) == 2
 
 
-def test_the_brightest_lights_remain_where_there_are_too_many() -> None:
+def test_no_light_of_many_is_left_out() -> None:
     assert len(imported(with_lights([{"type": "point"}] * 64)).lights) == 64
-    lights = [{"type": "point", "name": f"L{k}", "intensity": 1000 + k} for k in range(70)]
+    lights = [{"type": "point", "name": f"L{k}", "intensity": 683 * (1 + k)} for k in range(70)]
     scene = imported(with_lights(lights))
-    assert [light.name for light in scene.lights] == [f"L{k}" for k in range(6, 70)]
-    (warning,) = (warning for warning in scene.warnings if "dimmest" in warning)
-    assert "6 of 70" in warning
-    assert warning.severity == "unsupported"
+    (source,) = scene.lights
+    assert source.members is not None
+    assert source.fields["emission"] == [35.5] * 3
+    np.testing.assert_allclose(source.members.relative_emission * 35.5, np.arange(1, 71), rtol=1e-6)
+    assert any("70 of 70 lights were merged into 1 source" in warning for warning in scene.warnings)
+
+
+def test_nodes_of_one_light_are_a_group() -> None:
+    nodes = [
+        {"name": name, "extensions": {"KHR_lights_punctual": {"light": k}}}
+        for name, k in (("Lobby", 0), ("Kitchen", 0), ("Bath", 1))
+    ]
+    scene = imported(with_lights([{"type": "point"}, {"type": "point"}], nodes))
+    groups = default_look(scene.materials, scene.lights)["light_groups"]
+    assert {name: group["lights"] for name, group in groups.items()} == {"Lobby": ["Lobby", "Kitchen"]}
 
 
 def test_lights_of_all_kinds_compare_by_their_power() -> None:
     """A quad that emits L has π L; a directional light of irradiance E passes π d² / 4 E."""
-    glb = with_lights([{"type": "point", "name": f"L{k}", "intensity": 683} for k in range(64)])
+    names = [f"{chr(65 + k % 26)}{chr(65 + k // 26)}" for k in range(64)]
+    glb = with_lights([{"type": "point", "name": name, "intensity": 683} for name in names])
     glb.document["extensions"]["KHR_lights_punctual"]["lights"] += [
         {"type": "directional", "name": "Sun", "intensity": 683 * 10},
         {"type": "spot", "name": "Spot", "intensity": 683 * 2, "spot": {"outerConeAngle": np.pi / 3}},
     ]
     glb.document["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": k}}} for k in (64, 65)]
     glb.document["scenes"][0]["nodes"] += [65, 66]
-    names = [light.name for light in imported(glb).lights]
-    assert "Sun" in names  # π/4 · 2 · 10 = 15.7 W, a point light has 12.6 W
-    assert "Spot" not in names  # π · 2 = 6.3 W
+    lights = {light.name: light for light in imported(glb).lights}
+    assert "Sun" in lights  # π/4 · 2 · 10 = 15.7 W, a point light has 12.6 W
+    assert "Spot" not in lights  # π · 2 = 6.3 W
+    rest = lights["Other lights"].members
+    assert rest is not None
+    assert len(rest.position) == 4  # 62 sources of single lights, and these
+    np.testing.assert_allclose(sorted(rest.cone[:, 1]), [60, 180, 180, 180])
 
 
 def test_too_bright_lights_are_clamped_and_zero_scaled_ones_omitted() -> None:

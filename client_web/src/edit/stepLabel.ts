@@ -7,7 +7,7 @@ const SEPARATOR = " · ";
 /** "Teapot · half angle θh · move point": material, curve and action of an edit at a JSON pointer of the look. */
 export function stepLabel(path: string, action: string, look: Look, models: readonly ModelBody[]): string {
   const [table, subject, , index, kind, name] = pointerTokens(path);
-  if (table === "lights" && subject !== undefined) return subject + SEPARATOR + action;
+  if ((table === "lights" || table === "light_groups") && subject !== undefined) return subject + SEPARATOR + action;
   if (table !== "materials" || subject === undefined) return action;
   if (kind !== "curves") return subject + SEPARATOR + action;
   const term = look.materials[subject]?.terms[Number(index)];

@@ -69,6 +69,16 @@ class LightPointer:
 
 
 @dataclass(frozen=True)
+class LightGroupPointer:
+    """A light group of a look."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return f"/light_groups/{_escape(self.name)}"
+
+
+@dataclass(frozen=True)
 class EnvironmentPointer:
     """A field of a look's environment."""
 
@@ -78,7 +88,15 @@ class EnvironmentPointer:
         return f"/environment/{self.field}"
 
 
-Pointer = CurvePointer | ParameterPointer | ColorPointer | TransportPointer | LightPointer | EnvironmentPointer
+Pointer = (
+    CurvePointer
+    | ParameterPointer
+    | ColorPointer
+    | TransportPointer
+    | LightPointer
+    | LightGroupPointer
+    | EnvironmentPointer
+)
 
 ROTATION = EnvironmentPointer("rotation")
 _POINTER_TYPES: dict[str, type[CurvePointer] | type[ParameterPointer]] = {
@@ -91,6 +109,7 @@ _TERM = re.compile(
 _COLOR = re.compile(r"/materials/(?P<material>[^/]+)/terms/(?P<term>0|[1-9][0-9]{0,2})/(?P<field>color|texture)")
 _TRANSPORT = re.compile(rf"/transport/(?P<field>{'|'.join(TransportLook.model_fields)})")
 _LIGHT = re.compile(r"/lights/(?P<name>[^/]+)")
+_LIGHT_GROUP = re.compile(r"/light_groups/(?P<name>[^/]+)")
 _ENVIRONMENT = re.compile(rf"/environment/(?P<field>{'|'.join(EnvironmentLook.model_fields)})")
 
 
@@ -108,6 +127,8 @@ def parse_pointer(pointer: str) -> Pointer:
         return TransportPointer(transport["field"])
     if light := _LIGHT.fullmatch(pointer):
         return LightPointer(_unescape(light["name"]))
+    if group := _LIGHT_GROUP.fullmatch(pointer):
+        return LightGroupPointer(_unescape(group["name"]))
     if environment := _ENVIRONMENT.fullmatch(pointer):
         return EnvironmentPointer(environment["field"])
     raise ParameterError(

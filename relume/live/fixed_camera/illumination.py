@@ -188,7 +188,7 @@ def _environment_gain(look: Look, solo_sources: frozenset[str] | None) -> Rgb:
 def _lit_local_lights(look: Look, solo_sources: frozenset[str] | None) -> Iterator[LightSource]:
     """Yield the local lights with a gain above zero."""
     for name, light in look.lights.items():
-        gain = light.gain if solo_sources is None else light.model_copy(update={"enabled": name in solo_sources}).gain
+        gain = light.gain if solo_sources is None else light.full_gain if name in solo_sources else _ZERO_GAIN
         if any(gain):
             yield LightSource(light.geometry, gain)
 

@@ -56,6 +56,7 @@ _MOST_COVERAGES = 16  # normals of a pixel at which the share of a triangle is e
 _DIRECTION_SEED = np.uint32(0x27D4EB2F)
 _MOST_TRIANGLES, _LEAST_AREA = 128, 1e-12  # of an area light; area relative to its largest triangle
 _TINY = 1e-300
+_NONE, _NO_TRIANGLES = np.zeros(0), np.zeros((1, 0, 3, 3))
 _POINT_RADIUS = np.float32(2e-4)  # of a light without an extent, radians
 
 
@@ -63,7 +64,7 @@ class LobeEmitter(NamedTuple):
     """A local light of unit emission as narrow lobes see it.
 
     Attributes:
-        light, strata: the light, with one sample if it has no surface.
+        light, strata: the light, with its samples.
         triangles: of its surface, meters; empty for none. normal: unit, of each.
         end_offset: of ray ends from each, see `relume.math.plane_rounding.end_offsets`.
         radiance: relative to the emission.
@@ -86,7 +87,7 @@ class LobeEmitter(NamedTuple):
         Args:
             light: the light. strata: its samples, from `relume.lights.local_lights.make_light_strata`.
         """
-        power, triangles = _halves(light, strata)
+        power, triangles = _halves(light, strata) if light.kind == SURFACE else (_NONE, _NO_TRIANGLES)
         normal = np.cross(triangles[..., 1, :] - triangles[..., 0, :], triangles[..., 2, :] - triangles[..., 0, :])
         length = np.linalg.norm(normal, axis=2)
         radiance = light.area * power / np.maximum(length.sum(axis=0) / 2, _TINY)
@@ -255,13 +256,24 @@ def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, ga
         out: added to. (n, 3)
     """
     packet, irradiance = new_packet(tracer), np.empty(LANES, np.float32)
+    for sample in range(emitter.strata.uv.shape[0]):
+        _add_small_sample(
+            packet, irradiance, points, wo, footprint, pattern, widths, emitter, sample, gain, start, stop, out
+        )
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
+def _add_small_sample(
+    packet, irradiance, points, wo, footprint, pattern, widths, emitter, sample, gain, start, stop, out
+):  # type: ignore[no-untyped-def]
+    """Add one sample of a light without a surface. irradiance: scratch memory, a value for each lane"""
     for first in range(start, stop, LANES):
         width, num_lit = min(LANES, stop - first), 0
         for lane in range(width):
             p = first + lane
             x, y, z = points.position[p, 0], points.position[p, 1], points.position[p, 2]
             dx, dy, dz, distance, weight, nx, ny, nz, lift = light_sample(
-                emitter.light, emitter.strata, 0, _ZERO, _ZERO, x, y, z
+                emitter.light, emitter.strata, sample, _ZERO, _ZERO, x, y, z
             )
             irradiance[lane], spread = 0, half_vector_spread(footprint, p)
             chord = _chord(mirror_direction(points, p, wo), (dx, dy, dz))

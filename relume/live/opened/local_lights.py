@@ -16,10 +16,12 @@ from relume.core.errors import ChunkDamagedError, StoreError
 from relume.images.image_store import load_texture
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import (
+    LightPoints,
     LightTriangles,
     LocalLight,
     emitter_geometry,
     make_light_strata,
+    panel_triangles,
     prepare_local_lights,
 )
 from relume.live.fixed_camera.illumination import Illumination, LightSource
@@ -27,7 +29,7 @@ from relume.live.free_camera.lobe_lights import LobeEmitter, LobeLight
 from relume.live.opened.linked_surfaces import LinkedSurfaces
 from relume.look import LightGeometry
 from relume.look.model import Link
-from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
+from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test, read_light_members
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.emission_image import ImageEmitter, image_emitter
 from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
@@ -42,6 +44,7 @@ F32 = NDArray[np.float32]
 SAMPLES = 64  # of a rectangle, per view sample
 MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # mesh lights have more samples, if the scene has few emissive materials
 COARSE_SAMPLES = 16  # that stand for parts of a surface in narrow lobes
+LOBE_SAMPLES = 256  # of many points, a quarter of how many narrow lobes show: each is a highlight
 PREVIEW_SAMPLES = 4  # during an edit of the light
 _ONES = np.ones(3, np.float32)
 
@@ -154,9 +157,10 @@ class LocalLights:
         ]
 
     def _lobe_emitter(self, geometry: LightGeometry) -> LobeEmitter:
+        num_samples = LOBE_SAMPLES if geometry.kind == "points" else COARSE_SAMPLES
         return self._cache.transient.get_value(
             (self._key, "light in lobes", geometry),
-            lambda: LobeEmitter.from_light(*self.sample_light(geometry, COARSE_SAMPLES)),
+            lambda: LobeEmitter.from_light(*self.sample_light(geometry, num_samples)),
         )
 
     def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
@@ -223,6 +227,8 @@ class LocalLights:
         return self._cache.get_value((self._key, "local light", geometry), lambda: self._build_light(geometry))
 
     def _build_light(self, geometry: LightGeometry) -> LocalLight:
+        if geometry.source:
+            return self._build_members(geometry)
         if geometry.kind != "mesh":
             return prepare_local_lights(geometry)
         material, face_mask = self._emissive_faces(geometry.material)
@@ -236,6 +242,13 @@ class LocalLights:
             face_emission = self._store.read("scene/face_emission")[face_mask]
         corners = self.positions[self.faces[face_mask]]
         return prepare_local_lights(geometry, LightTriangles(corners, face_emission, self._is_two_sided(material)))
+
+    def _build_members(self, geometry: LightGeometry) -> LocalLight:
+        members = read_light_members(self._store, geometry.source)
+        if geometry.kind == "points":
+            points = LightPoints(members.position, members.direction, members.cone, members.relative_emission)
+            return prepare_local_lights(geometry, points=points)
+        return prepare_local_lights(geometry, panel_triangles(members.light_fields("panels", (1.0,))))
 
     def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
         """Return the image that a light's surfaces emit; None if they emit as in the scene.

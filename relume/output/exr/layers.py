@@ -1,11 +1,13 @@
 """Layers of an image: one per light and one per class of light paths, where each of the two sets sums to the image; or
-light groups, the direct and the indirect light of each light, which together sum to the image.
+light groups, the direct and the indirect light of each, which together sum to the image. A light in no group is one of
+its own.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -53,7 +55,7 @@ def light_and_path_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
     Args:
         look, has_indirect: as in `make_layers`.
     """
-    light_looks = _single_light_looks(look)
+    light_looks = _source_looks(look, [(name, (name,)) for name in look.lights])
     unnamed_layers = (
         [_UnnamedLayer("light", source, "", light_look) for source, light_look in light_looks]
         if len(light_looks) > 1
@@ -71,7 +73,7 @@ def light_and_path_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
 
 
 def light_group_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
-    """Make one layer per light for each of direct and indirect light; together they sum to the image.
+    """Make one layer per light group for each of direct and indirect light; together they sum to the image.
 
     Args:
         look, has_indirect: as in `make_layers`.
@@ -82,7 +84,7 @@ def light_group_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
     whole = look.transport.show == "all"
     unnamed_layers = [
         _UnnamedLayer("light", source, f"_{path_kind}", _only_path_kind(light_look, path_kind) if whole else light_look)
-        for source, light_look in _single_light_looks(look)
+        for source, light_look in _source_looks(look, _light_groups(look))
         for path_kind in classes
     ]
     return _name_layers([*unnamed_layers, *_background_layers(look)])
@@ -98,13 +100,31 @@ class _UnnamedLayer:
     look: Look
 
 
-def _single_light_looks(look: Look) -> list[tuple[str, Look]]:
-    """Each light with emission, and the look with only this light; its background is black if it was a color."""
-    names = [name for name, light in look.lights.items() if any(light.gain)]
+_Source = tuple[str, Sequence[str]]
+"""Name of a source of light, and of its lights."""
+
+
+def _light_groups(look: Look) -> list[_Source]:
+    """Each group with its lights, then each of the other lights by itself."""
+    groups: list[_Source] = [(name, group.lights) for name, group in look.light_groups.items()]
+    grouped = {name for _, names in groups for name in names}
+    return [*groups, *((name, (name,)) for name in look.lights if name not in grouped)]
+
+
+def _source_looks(look: Look, sources: Sequence[_Source]) -> list[tuple[str, Look]]:
+    """The environment and each source with emission, and the look with only its lights; a background color is black.
+
+    Args:
+        look: look of the image. sources: of its local light.
+    """
     light_looks: list[tuple[str, Look]] = (
         [(ENVIRONMENT, _lit_only_by(look, None))] if any(look.environment.gain) else []
     )
-    light_looks += [(name, _lit_only_by(look, name)) for name in names]
+    light_looks += [
+        (source, _lit_only_by(look, names))
+        for source, names in sources
+        if any(any(look.lights[name].gain) for name in names)
+    ]
     return (
         [(source, _with_black_background(light_look)) for source, light_look in light_looks]
         if look.background.kind == "color"
@@ -114,16 +134,16 @@ def _single_light_looks(look: Look) -> list[tuple[str, Look]]:
 
 def _background_layers(look: Look) -> list[_UnnamedLayer]:
     """Layer of a background color, which belongs to no light."""
-    return [_UnnamedLayer("light", BACKGROUND, "", _lit_only_by(look, ""))] if look.background.kind == "color" else []
+    return [_UnnamedLayer("light", BACKGROUND, "", _lit_only_by(look, ()))] if look.background.kind == "color" else []
 
 
-def _lit_only_by(look: Look, source: str | None) -> Look:
-    """Return the look with only one of its lights; None: its environment."""
+def _lit_only_by(look: Look, names: Collection[str] | None) -> Look:
+    """Return the look with only some of its lights; None: its environment."""
     lights = {
-        name: light.model_copy(update={"enabled": light.enabled and name == source})
+        name: light.model_copy(update={"enabled": light.enabled and name in (names or ())})
         for name, light in look.lights.items()
     }
-    environment = look.environment if source is None else look.environment.model_copy(update={"intensity": 0.0})
+    environment = look.environment if names is None else look.environment.model_copy(update={"intensity": 0.0})
     return look.model_copy(update={"lights": lights, "environment": environment})
 
 

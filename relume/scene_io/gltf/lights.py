@@ -116,7 +116,8 @@ class LightReader:
             self._warnings.append(_UNITS)
         if light.type != "directional":
             self._intensities.append(light.intensity)
-        self._collector.add(name, fields, np.array(light.color) * light.intensity / self._divisor(light.type))
+        emission = np.array(light.color) * light.intensity / self._divisor(light.type)
+        self._collector.add(name, fields, emission, instance=reference.light)
 
     def _divisor(self, kind: str) -> float:
         """Strength in the file over W/sr, or W/m² of a directional light; a spot's power is that of a point light."""

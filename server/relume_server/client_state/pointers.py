@@ -12,6 +12,7 @@ from relume.live.fixed_camera.edit_pointers import (
     ColorPointer,
     CurvePointer,
     EnvironmentPointer,
+    LightGroupPointer,
     LightPointer,
     ParameterPointer,
     TransportPointer,
@@ -44,6 +45,8 @@ def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
             exists = term_index < len(document["materials"].get(material, {"terms": ()})["terms"])
         case LightPointer(name):
             exists = name in document["lights"]
+        case LightGroupPointer(name):
+            exists = name in document["light_groups"]
         case EnvironmentPointer() | TransportPointer():
             exists = True
         case CurvePointer():

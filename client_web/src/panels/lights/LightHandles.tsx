@@ -66,6 +66,8 @@ const SHAPES: Record<LightKind | "aim", string> = {
   directional:
     "M-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0 -7 0zM0 -5.5v-2.5M0 5.5v2.5M-5.5 0h-2.5M5.5 0h2.5M-4 -4l-1.7 -1.7M4 4l1.7 1.7M-4 4l-1.7 1.7M4 -4l1.7 -1.7",
   mesh: "",
+  points: "",
+  panels: "",
   aim: "M0 -6l6 6l-6 6l-6 -6z",
 };
 

@@ -12,8 +12,9 @@ import { NumberField } from "../../ui/NumberField";
 import { Emission } from "./Emission";
 import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "./lightFields";
 import { placeLight } from "./handleGeometry";
-import { completeLight, LIGHT_KINDS, labelOf, changeKind, type AddedKind } from "./lightKinds";
 import { LinkField } from "./LinkField";
+import { createGroup, groupOfLight, lightGroups, moveToGroup } from "./lightGroups";
+import { completeLight, LIGHT_KINDS, labelOf, changeKind, isAddedKind, type AddedKind } from "./lightKinds";
 import {
   changeLight,
   duplicateLight,
@@ -79,6 +80,8 @@ function AngleFieldSlider({ name, light, angleField }: NamedLight & { angleField
 function LightKindSelect({ name, light }: NamedLight) {
   if (light.kind === "mesh")
     return <p class="hint">Emissive mesh with material “{light.material}”. Its position comes from the scene.</p>;
+  if (!isAddedKind(light.kind))
+    return <p class="hint">Lights of the scene, edited as one. Their positions and relative strengths are fixed.</p>;
   const change = (kind: AddedKind) => editValue("Change type", lightPath(name), changeKind(light, kind));
   return (
     <div class="kind">
@@ -92,6 +95,30 @@ function LightKindSelect({ name, light }: NamedLight) {
             {label}
           </option>
         ))}
+      </select>
+    </div>
+  );
+}
+
+const NEW_GROUP = "new";
+
+function GroupSelect({ name }: { name: string }) {
+  const groups = Object.keys(lightGroups.value);
+  const group = groups.indexOf(groupOfLight.value.get(name) ?? "");
+  const change = (value: string) => {
+    if (value === NEW_GROUP) createGroup(name);
+    else moveToGroup(name, groups[Number(value)] ?? null);
+  };
+  return (
+    <div class="kind">
+      <select aria-label="Light group" value={group} onChange={(event) => change(event.currentTarget.value)}>
+        <option value={-1}>No group</option>
+        {groups.map((label, k) => (
+          <option key={label} value={k}>
+            {label}
+          </option>
+        ))}
+        <option value={NEW_GROUP}>New group</option>
       </select>
     </div>
   );
@@ -128,7 +155,7 @@ export function LightInspector({ name, light }: NamedLight) {
             name
           )}
         </h2>
-        {light.kind !== "mesh" && (
+        {isAddedKind(light.kind) && (
           <IconButton icon="copy" label="Duplicate light" onClick={() => duplicateLight(name)} />
         )}
         {isAddedLight(name) ? (
@@ -144,6 +171,7 @@ export function LightInspector({ name, light }: NamedLight) {
       </header>
       <section class="card light-card" aria-label={labelOf(light.kind)}>
         <LightKindSelect name={name} light={light} />
+        <GroupSelect name={name} />
         <Emission name={name} light={light} />
         {"position" in light && "direction" in light && <AimLockSwitch />}
         {numbersFieldsOf(light).map((field) => (

@@ -31,6 +31,8 @@ export function anchorsOf(light: Light, camera: ProjectionCamera): Anchors | nul
       return { position: subtract(middle, scale(normalize(light.direction), reach)), target: middle };
     }
     case "mesh":
+    case "points":
+    case "panels":
       return null;
   }
 }
@@ -44,7 +46,7 @@ export interface LightChange {
 /** Changes of a light moved to a position: the position, and with a locked target the direction. Null if that would
  * leave no direction. */
 export function placeLight(light: Light, to: Triple, aimLocked: boolean): LightChange | null {
-  if (light.kind === "mesh" || light.kind === "directional") return null;
+  if (!("position" in light)) return null;
   const position = roundComponents(to);
   if (light.kind === "point" || !aimLocked) return { position };
   const direction = subtract(add(light.position, light.direction), position);

@@ -9,7 +9,8 @@ import { defaultLook, look } from "../../state/look";
 import { selectedLight, selectLight } from "../../state/selection";
 import { showNote } from "../../ui/toasts";
 import type { LightChange } from "./handleGeometry";
-import { offsetCopy, nextLightName } from "./lightKinds";
+import { groupOfLight, lightGroups, withoutLights } from "./lightGroups";
+import { isAddedKind, offsetCopy, nextLightName } from "./lightKinds";
 
 export const lights = computed<Record<string, Light>>(() => look.value?.lights ?? {});
 export const lightNames = computed(() => Object.keys(lights.value));
@@ -50,9 +51,19 @@ export function changeLight(label: string, name: string, change: LightChange): v
 /** Add a copy of a light beside it. */
 export function duplicateLight(name: string): void {
   const light = lights.peek()[name];
-  if (light === undefined || light.kind === "mesh") return;
+  if (light === undefined || !isAddedKind(light.kind)) return;
   if (lightNames.peek().length >= MAX_LIGHTS) showNote(`Limit of ${MAX_LIGHTS} lights reached. Remove one first.`);
   else addLight(nextLightName(name, lightNames.peek()), offsetCopy(light));
+}
+
+function withRenamedLight(groups: Look["light_groups"], name: string, to: string): Look["light_groups"] {
+  const rename = (lights: string[]) => lights.map((light) => (light === name ? to : light));
+  return Object.fromEntries(
+    Object.entries(groups).map(([key, group]) => [
+      key,
+      group.lights.includes(name) ? { ...group, lights: rename(group.lights) } : group,
+    ]),
+  );
 }
 
 /** Rename a light that was added in the editor; it keeps its position in the list. */
@@ -65,7 +76,11 @@ export function renameLight(name: string, to: string): void {
     light,
   ]);
   batch(() => {
-    replaceLook(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });
+    replaceLook(`${name} · Rename to ${to}`, {
+      ...current,
+      lights: Object.fromEntries(renamed) as Look["lights"],
+      light_groups: withRenamedLight(current.light_groups, name, to),
+    });
     if (selectedLight.peek() === name) selectedLight.value = to;
     if (soloLight.peek() === name) soloLight.value = to;
   });
@@ -74,5 +89,9 @@ export function renameLight(name: string, to: string): void {
 export function removeLight(name: string): void {
   if (!isAddedLight(name)) return;
   if (selectedLight.peek() === name) selectedLight.value = null;
-  editValue("Remove", lightPath(name), undefined);
+  const current = look.peek();
+  if (current === null || !groupOfLight.peek().has(name)) return editValue("Remove", lightPath(name), undefined);
+  const remaining = Object.fromEntries(Object.entries(current.lights).filter(([key]) => key !== name));
+  const groups = withoutLights(lightGroups.peek(), [name]);
+  replaceLook(`${name} · Remove`, { ...current, lights: remaining, light_groups: groups } as Look);
 }

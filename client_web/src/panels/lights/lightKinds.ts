@@ -3,8 +3,8 @@ import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../../protocol";
 import { add, length, scale, subtract, roundComponents } from "./vector";
 
-/** Kinds that can be added; emissive meshes come with a scene or an emission map. */
-export type AddedKind = Exclude<LightKind, "mesh">;
+/** Kinds that can be added; emissive meshes come with a scene or an emission map, sources of many lights with a scene. */
+export type AddedKind = Exclude<LightKind, "mesh" | "points" | "panels">;
 
 interface LightKindLabels {
   kind: AddedKind;
@@ -21,8 +21,21 @@ export const LIGHT_KINDS: readonly LightKindLabels[] = [
   { kind: "directional", label: "Sun", help: "Parallel light from a distant source", click: "aim the sun" },
 ];
 
+const SCENE_LABELS: Record<Exclude<LightKind, AddedKind>, string> = {
+  mesh: "Emissive mesh",
+  points: "Many lights",
+  panels: "Many panels",
+};
+
 export function labelOf(kind: LightKind): string {
-  return LIGHT_KINDS.find((candidate) => candidate.kind === kind)?.label ?? "Emissive mesh";
+  return isAddedKind(kind)
+    ? (LIGHT_KINDS.find((candidate) => candidate.kind === kind)?.label ?? kind)
+    : SCENE_LABELS[kind];
+}
+
+/** True if lights of a kind can be added, and their kind changed. */
+export function isAddedKind(kind: LightKind): kind is AddedKind {
+  return !(kind in SCENE_LABELS);
 }
 
 /** Unit of a light's emission. */
@@ -32,6 +45,8 @@ export const UNITS: Record<LightKind, string> = {
   directional: "W/m²",
   rectangle: "W/sr/m²",
   mesh: "W/sr/m²",
+  points: "W/sr",
+  panels: "W/sr/m²",
 };
 
 /** The clicked surface point, and the brightness of the image. */

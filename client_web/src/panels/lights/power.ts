@@ -16,12 +16,15 @@ export interface PhotometricUnits {
 const POWER: PhotometricUnits = { label: "Power", watts: "W", lumens: "lm" };
 /** Directional lights have no power, but an irradiance on a perpendicular surface. */
 const IRRADIANCE: PhotometricUnits = { label: "Illuminance", watts: "W/m²", lumens: "lx" };
-/** For emissive meshes, whose area belongs to the scene. */
+/** For many lights as one source, whose number belongs to the scene. */
+const INTENSITY: PhotometricUnits = { label: "Mean intensity", watts: "W/sr", lumens: "cd" };
+/** For emissive meshes and many panels, whose area belongs to the scene. */
 const RADIANCE: PhotometricUnits = { label: "Radiance", watts: "W/sr/m²", lumens: "cd/m²" };
 
 export function unitsOf(light: Light): PhotometricUnits {
   if (light.kind === "directional") return IRRADIANCE;
-  return light.kind === "mesh" ? RADIANCE : POWER;
+  if (light.kind === "points") return INTENSITY;
+  return light.kind === "mesh" || light.kind === "panels" ? RADIANCE : POWER;
 }
 
 const cosine = (degrees: number) => Math.cos((degrees * Math.PI) / 180);

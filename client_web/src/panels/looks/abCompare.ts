@@ -4,6 +4,7 @@ import { applyCameras, currentCameras, type CameraSet } from "../../viewport/cam
 import { isDeepEqual } from "../../state/document/difference";
 import { replaceLook } from "../../edit/edit";
 import { history } from "../../edit/history";
+import { completeGroup } from "../lights/lightGroups";
 import { completeLight } from "../lights/lightKinds";
 import { withViews } from "../../session/requestFrames";
 import { stage } from "../../render/renderStage";
@@ -39,6 +40,15 @@ export function completeLook(partial: Partial<Look>): Look {
         Object.entries(partial.lights ?? {}).map(([name, light]) => [name, completeLight(light, base.lights[name])]),
       ),
     },
+    light_groups:
+      partial.light_groups === undefined
+        ? base.light_groups
+        : Object.fromEntries(
+            Object.entries(partial.light_groups).map(([name, group]) => [
+              name,
+              completeGroup(group, base.light_groups[name]),
+            ]),
+          ),
     transport: { ...base.transport, ...partial.transport },
     display: { ...base.display, ...partial.display },
   };

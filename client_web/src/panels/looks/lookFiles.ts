@@ -4,11 +4,12 @@ import type { Look } from "../../protocol";
 import { look } from "../../state/look";
 import { fileBaseName } from "../../start/files/sceneFiles";
 import { reportErrors, showNote } from "../../ui/toasts";
+import { completeGroup } from "../lights/lightGroups";
 import { completeLook } from "./abCompare";
 
 const LIGHT_MIX = "relume light mix";
 const MAX_BYTES = 1 << 20;
-const SECTIONS = ["materials", "environment", "background", "lights", "transport", "display"];
+const SECTIONS = ["materials", "environment", "background", "lights", "light_groups", "transport", "display"];
 
 type Fields = Record<string, unknown>;
 
@@ -18,6 +19,17 @@ const isFields = (value: unknown): value is Fields =>
   typeof value === "object" && value !== null && !Array.isArray(value);
 
 const quoted = (names: readonly string[]) => names.map((name) => `“${name}”`).join(", ");
+
+/** The groups of a light mix with the lights of a look; those of the look if the mix has none. */
+function mixedGroups(current: Look, mix: Fields): unknown {
+  const groups = mix["light_groups"];
+  if (!isFields(groups)) return current.light_groups;
+  const existing = (names: unknown) =>
+    Array.isArray(names) ? names.filter((name: string) => Object.hasOwn(current.lights, name)) : [];
+  const complete = ([name, group]: [string, unknown]) =>
+    isFields(group) ? [[name, completeGroup({ ...group, lights: existing(group["lights"]) })]] : [];
+  return Object.fromEntries(Object.entries(groups).flatMap(complete));
+}
 
 /** The look with the lights and the environment of a light mix, and a sentence for each thing that it does not have. */
 export function withLightMix(current: Look, mix: Fields): { look: Look; notes: string[] } {
@@ -38,7 +50,7 @@ export function withLightMix(current: Look, mix: Fields): { look: Look; notes: s
     ...(missing.length > 0 ? [`This look has no lights ${quoted(missing)}; the others are set.`] : []),
     ...(differing.length > 0 ? [`Lights of another kind keep their emission: ${quoted(differing)}.`] : []),
   ];
-  return { look: { ...current, lights, environment } as Look, notes };
+  return { look: { ...current, lights, light_groups: mixedGroups(current, mix), environment } as Look, notes };
 }
 
 /** The look that a document makes of the current one. */

@@ -3,7 +3,7 @@ import { computed } from "@preact/signals";
 import { defaultLook, look } from "../look";
 import { pathFilterText } from "./pathLabels";
 import { pathOverride, setVisiblePaths, visiblePaths } from "./lightPaths";
-import { hasLightSource, soloMaterial, soloLight } from "./soloSources";
+import { lightsOfSource, sourceLabel, soloMaterial, soloLight } from "./soloSources";
 
 export interface ActiveFilter {
   label: string;
@@ -29,8 +29,8 @@ export const lightFilters = computed<ActiveFilter[]>(() => {
   const paths = pathFilterText(visiblePaths.value);
   if (paths !== null) filters.push({ label: paths, title: "Show all light", clear: resetLightPaths });
   const source = soloLight.value;
-  if (source !== null && hasLightSource(look.value, source)) {
-    const label = `Solo: ${source || "environment"}`;
+  if (source !== null && lightsOfSource(look.value, source) !== null) {
+    const label = `Solo: ${sourceLabel(look.value, source)}`;
     filters.push({ label, title: "Show all lights", clear: () => (soloLight.value = null) });
   }
   return filters;

@@ -30,14 +30,31 @@ export function toggleLightSolo(source: string): void {
 /** Name of the environment among the light sources; not a valid light name. */
 export const ENVIRONMENT_SOURCE = "";
 
-/** True if a look has this light source; a removed one can return by undo. */
-export function hasLightSource(look: Look, source: string): boolean {
-  return source === ENVIRONMENT_SOURCE || look.lights[source] !== undefined;
+const GROUP_PREFIX = "group:";
+
+/** Name of a light group among the light sources. */
+export const groupSource = (group: string) => GROUP_PREFIX + group;
+
+/** Names of the lights of a source, none of the environment; null if a look has no such source: a removed one can return
+ * by undo. */
+export function lightsOfSource(look: Look, source: string): readonly string[] | null {
+  if (source === ENVIRONMENT_SOURCE) return [];
+  if (look.lights[source] !== undefined) return [source];
+  return source.startsWith(GROUP_PREFIX)
+    ? (look.light_groups[source.slice(GROUP_PREFIX.length)]?.lights ?? null)
+    : null;
+}
+
+/** A light source as people name it. */
+export function sourceLabel(look: Look, source: string): string {
+  if (source === ENVIRONMENT_SOURCE) return "environment";
+  return look.lights[source] === undefined ? source.slice(GROUP_PREFIX.length) : source;
 }
 
 /** Names of the solo sources for the server; null: all. */
 export function soloSources(look: Look): string[] | null {
   const source = soloLight.peek();
-  if (source === null || !hasLightSource(look, source)) return null;
-  return [source === ENVIRONMENT_SOURCE ? "environment" : source];
+  const names = source === null ? null : lightsOfSource(look, source);
+  if (source === ENVIRONMENT_SOURCE) return ["environment"];
+  return names === null || names.length === 0 ? null : [...names];
 }

@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import NamedTuple
 
-from relume.live.fixed_camera.edit_pointers import ROTATION, ColorPointer, LightPointer, Pointer, TransportPointer
+from relume.live.fixed_camera.edit_pointers import (
+    ROTATION,
+    ColorPointer,
+    LightGroupPointer,
+    LightPointer,
+    Pointer,
+    TransportPointer,
+)
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import Job
@@ -70,7 +77,7 @@ class ActiveControl(NamedTuple):
     @property
     def edits_light(self) -> bool:
         """True if it changes the light from local lights or surfaces: a light, a color, the number of bounces."""
-        return isinstance(self.pointer, ColorPointer | LightPointer | TransportPointer)
+        return isinstance(self.pointer, ColorPointer | LightPointer | LightGroupPointer | TransportPointer)
 
     @property
     def rotates_environment(self) -> bool:
