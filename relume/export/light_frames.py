@@ -9,14 +9,16 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.lights.local_lights import rectangle
-from relume.look.model import LightLook, RectangleLook
+from relume.lights.shape_triangles import shape_triangles
+from relume.look.model import AreaLook, LightLook, RectangleLook
 from relume.raytrace.tangents import any_tangent
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
 def light_frame(light: LightLook) -> Shaped[F64, "4 4"]:
-    """Return the transform to world of a light other than an emissive mesh, rigid."""
+    """Return the transform to world of a light other than an emissive mesh, rigid. A tube lies along its −Z."""
     position = getattr(light, "position", (0.0, 0.0, 0.0))
     if isinstance(light, RectangleLook):
         across, up = rectangle(light.geometry)[1]
@@ -27,6 +29,16 @@ def light_frame(light: LightLook) -> Shaped[F64, "4 4"]:
     right -= (right @ backward) * backward
     right /= np.linalg.norm(right)
     return _frame(right, np.cross(backward, right), position)
+
+
+def local_triangles(light: AreaLook) -> Shaped[F32, "T 3 3"]:
+    """Return the triangles of an area light in its frame, counterclockwise from the emitting side."""
+    local = light.geometry._replace(position=(0.0, 0.0, 0.0), direction=(0.0, 0.0, -1.0), rotation=0.0)
+    triangles = shape_triangles(local)
+    if triangles is not None:
+        return triangles.corners
+    corner, (e, f) = rectangle(local)
+    return np.array([[corner, corner + e, corner + e + f], [corner, corner + e + f, corner + f]], np.float32)
 
 
 def _frame(right: F64, up: F64, position: Sequence[float]) -> Shaped[F64, "4 4"]:

@@ -7,7 +7,8 @@
     directional  w = 1                                             emission W/m²
     surface      w = A cos θl / (N d²),  N uniform samples         emission W/m²/sr
 
-A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are stratified and shifted in their strata
+A surface is a rectangle, or triangles of a mesh or of a shape (`relume.lights.shape_triangles`), chosen by area. A
+directional light with an angle is a distant disk. The samples of a surface are stratified and shifted in their strata
 per receiver (`relume.lights.light_sampling`), so that the remaining noise is of pixel frequency.
 """
 
@@ -21,6 +22,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.lights.light_axes import light_axes, unit_direction
 from relume.lights.light_sampling import (
     EmitterParts,
     LightStrata,
@@ -29,6 +31,7 @@ from relume.lights.light_sampling import (
     split_axes,
     subdivide_emitter,
 )
+from relume.lights.shape_triangles import LightTriangles, shape_triangles
 from relume.look import LightGeometry
 from relume.math.plane_rounding import end_offsets
 
@@ -36,13 +39,14 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 POINT, DIRECTIONAL, SURFACE = 0, 1, 2
+_KINDS = {"point": POINT, "spot": POINT, "directional": DIRECTIONAL}  # of lights without a surface
 _MIN_DISTANCE = np.float32(1e-12)  # meters, from point lights: so that the falloff is finite
 _INFINITE = np.float32(np.inf)
 _SEED = 1
-_SAMPLE_FACTORS = {"rectangle": 1, "mesh": 4}  # most samples of a mesh face away from a point, or are far from it
+# most samples of a mesh face away from a point, or are far from it; half of those of a sphere and a tube face away
+_SAMPLE_FACTORS = {"rectangle": 1, "disc": 1, "sphere": 4, "tube": 4, "mesh": 4}
 _PI = np.float32(math.pi)
 _MIN_CONE_COSINES = 1e-3  # difference of cosines, as in KHR_lights_punctual
-_PARALLEL_TOLERANCE = 1e-6
 
 
 class LocalLight(NamedTuple):
@@ -56,6 +60,7 @@ class LocalLight(NamedTuple):
         end_offset: of ray ends from the pieces, see `relume.math.plane_rounding.end_offsets`.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
         is_rectangle: a parallelogram, else triangles. is_two_sided: emits to both sides.
+        sample_factor: number of samples over that of a rectangle; 0 for a light without a surface.
     """
 
     kind: int
@@ -71,30 +76,23 @@ class LocalLight(NamedTuple):
     area: np.float32
     is_rectangle: bool
     is_two_sided: bool
-
-
-class LightTriangles(NamedTuple):
-    """Emissive triangles.
-
-    Attributes:
-        corners: corners of the triangles. relative_radiance: radiance of each over the mean of all.
-        is_two_sided: emits to both sides.
-    """
-
-    corners: Shaped[F32, "T 3 3"]
-    relative_radiance: Shaped[F32, " T"]
-    is_two_sided: bool
+    sample_factor: int
 
 
 def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
     """Return the number of samples of a light, given that of a rectangle."""
-    return _SAMPLE_FACTORS.get(geometry.kind, 0) * num_rectangle_samples or 1
+    return _sample_factor(geometry) * num_rectangle_samples or 1
+
+
+def _sample_factor(geometry: LightGeometry) -> int:
+    if geometry.kind == "directional":
+        return int(geometry.angle > 0)
+    return _SAMPLE_FACTORS.get(geometry.kind, 0)
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
     """Create the samples of a light. num_rectangle_samples: samples of a rectangle, a power of four"""
-    factor = _SAMPLE_FACTORS["rectangle" if light.is_rectangle else "mesh"]
-    num_light_samples = factor * num_rectangle_samples if light.kind == SURFACE else 1
+    num_light_samples = light.sample_factor * num_rectangle_samples or 1
     return make_strata(split_axes(len(light.power_cdf), num_light_samples), _SEED)
 
 
@@ -105,21 +103,28 @@ def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
 
 
 def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | None = None) -> LocalLight:
-    """Prepare a light of a look. triangles: triangles of a light of kind "mesh"; without area it emits nothing."""
+    """Prepare a light of a look.
+
+    Args:
+        geometry: the light.
+        triangles: of a light of kind "mesh", which without area emits nothing; or of a sun disk, from `sun_triangles`.
+    """
     is_rectangle = geometry.kind == "rectangle"
+    triangles = shape_triangles(geometry) if triangles is None else triangles
     corner, edges = _outline(geometry, triangles)
     piece_normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.linalg.norm(piece_normals, axis=1) * (1.0 if is_rectangle else 0.5)
     if triangles is not None:
         areas = areas * triangles.relative_radiance
     pieces, area = np.flatnonzero(areas > 0), areas.sum()
-    pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
+    if geometry.kind == "mesh":
+        pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
     piece_normals = piece_normals[pieces] / np.linalg.norm(piece_normals[pieces], axis=1, keepdims=True)
     scale, offset = _cone(*geometry.cone) if geometry.kind == "spot" else (0.0, 1.0)
     return LocalLight(
-        kind={"point": POINT, "spot": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE),
+        kind=SURFACE if len(pieces) else _KINDS.get(geometry.kind, SURFACE),
         position=np.array(geometry.position, np.float32),
-        axis=_unit(geometry.direction).astype(np.float32),
+        axis=unit_direction(geometry.direction).astype(np.float32),
         cone_scale=np.float32(scale),
         cone_offset=np.float32(offset),
         corner=corner[pieces].astype(np.float32),
@@ -130,6 +135,7 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
         area=np.float32(area),
         is_rectangle=is_rectangle,
         is_two_sided=triangles is not None and triangles.is_two_sided,
+        sample_factor=_sample_factor(geometry),
     )
 
 
@@ -149,26 +155,8 @@ def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple
 
 def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, " 3"], Shaped[F64, "2 3"]]:
     """Return a corner and the edges of a rectangle, whose cross product points to its emitting side; meters."""
-    facing = _unit(geometry.direction)
-    up_hint = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _PARALLEL_TOLERANCE else np.array([0.0, 0.0, 1.0])
-    up = up_hint - (up_hint @ facing) * facing
-    up /= np.linalg.norm(up)
-    horizontal = np.cross(up, facing)
-    angle = math.radians(geometry.rotation)
-    width, height = geometry.size
-    edges = np.stack(
-        [
-            width * (math.cos(angle) * horizontal + math.sin(angle) * up),
-            height * (math.cos(angle) * up - math.sin(angle) * horizontal),
-        ]
-    )
+    edges = np.array(geometry.size)[:, None] * light_axes(geometry.direction, geometry.rotation)[:2]
     return np.array(geometry.position, np.float64) - edges.sum(axis=0) / 2, edges
-
-
-def _unit(direction: tuple[float, float, float]) -> F64:
-    vector = np.array(direction, np.float64)
-    vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not underflow
-    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _cone(inner: float, outer: float) -> tuple[float, float]:

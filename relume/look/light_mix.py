@@ -19,6 +19,9 @@ UNITS = {
     "spot": "W/sr",
     "directional": "W/m²",
     "rectangle": "W/(sr·m²)",
+    "disc": "W/(sr·m²)",
+    "sphere": "W/(sr·m²)",
+    "tube": "W/(sr·m²)",
     "mesh": "W/(sr·m²)",
 }
 """Units of `emission` by the kind of light."""

@@ -15,7 +15,7 @@ from relume.image_io.ocio.view import OcioView
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
-LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
+LightKind = Literal["point", "spot", "directional", "rectangle", "disc", "sphere", "tube", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
 PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
@@ -145,6 +145,9 @@ class LightGeometry(NamedTuple):
     cone: tuple[float, float] = (0.0, 90.0)
     rotation: float = 0.0
     size: tuple[float, float] = (0.0, 0.0)
+    radius: float = 0.0
+    length: float = 0.0
+    angle: float = 0.0
     material: str = ""
     image: str | None = None
     channel: int | None = None
@@ -188,10 +191,14 @@ class SpotLook(_LightLook):
 
 
 class DirectionalLook(_LightLook):
-    """Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m²."""
+    """Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m².
+
+    `angle`: diameter of the disk that it comes from, degrees; 0 for parallel light.
+    """
 
     kind: Literal["directional"]
     direction: Xyz
+    angle: float = 0.0
 
 
 class RectangleLook(_LightLook):
@@ -208,6 +215,36 @@ class RectangleLook(_LightLook):
     size: tuple[float, float]
 
 
+class DiscLook(_LightLook):
+    """A disc that emits toward `direction`; emission is radiance. The camera does not see it. `radius`: meters."""
+
+    kind: Literal["disc"]
+    position: Xyz
+    direction: Xyz
+    radius: float
+
+
+class SphereLook(_LightLook):
+    """A sphere; emission is radiance. The camera does not see it. `radius`: meters."""
+
+    kind: Literal["sphere"]
+    position: Xyz
+    radius: float
+
+
+class TubeLook(_LightLook):
+    """A tube, whose side emits and whose ends do not; emission is radiance. The camera does not see it.
+
+    `position`: its middle. `direction`: its axis. `radius`, `length`: meters.
+    """
+
+    kind: Literal["tube"]
+    position: Xyz
+    direction: Xyz
+    radius: float
+    length: float
+
+
 class MeshLook(_LightLook):
     """All surfaces of a material emit and are visible; emission is radiance.
 
@@ -220,7 +257,12 @@ class MeshLook(_LightLook):
     image: str | None = None
 
 
-LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook, Field(discriminator="kind")]
+AreaLook = RectangleLook | DiscLook | SphereLook | TubeLook
+"""Area lights other than emissive meshes."""
+LightLook = Annotated[
+    PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook,
+    Field(discriminator="kind"),
+]
 
 
 _MANY_BOUNCES = 8  # later ones bring hardly any light
