@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.lights.local_lights import rectangle
 from relume.lights.shape_triangles import shape_triangles
-from relume.look.model import AreaLook, LightLook, RectangleLook
+from relume.look.model import AreaLook, LightLook, RectangleLook, TubeLook
 from relume.raytrace.tangents import any_tangent
 
 F32 = NDArray[np.float32]
@@ -18,7 +18,7 @@ F64 = NDArray[np.float64]
 
 
 def light_frame(light: LightLook) -> Shaped[F64, "4 4"]:
-    """Return the transform to world of a light other than an emissive mesh, rigid. A tube lies along its −Z."""
+    """Return the transform to world of a light other than an emissive mesh, rigid. A tube lies along its X."""
     position = getattr(light, "position", (0.0, 0.0, 0.0))
     if isinstance(light, RectangleLook):
         across, up = rectangle(light.geometry)[1]
@@ -28,12 +28,15 @@ def light_frame(light: LightLook) -> Shaped[F64, "4 4"]:
     right = any_tangent(backward[None].astype(np.float32))[0].astype(np.float64)
     right -= (right @ backward) * backward
     right /= np.linalg.norm(right)
+    if isinstance(light, TubeLook):
+        return _frame(-backward, right, position)
     return _frame(right, np.cross(backward, right), position)
 
 
 def local_triangles(light: AreaLook) -> Shaped[F32, "T 3 3"]:
     """Return the triangles of an area light in its frame, counterclockwise from the emitting side."""
-    local = light.geometry._replace(position=(0.0, 0.0, 0.0), direction=(0.0, 0.0, -1.0), rotation=0.0)
+    direction = (1.0, 0.0, 0.0) if isinstance(light, TubeLook) else (0.0, 0.0, -1.0)
+    local = light.geometry._replace(position=(0.0, 0.0, 0.0), direction=direction, rotation=0.0)
     triangles = shape_triangles(local)
     if triangles is not None:
         return triangles.corners
