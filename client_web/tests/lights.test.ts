@@ -38,7 +38,7 @@ const spot = {
   direction: [0, -2, 0],
   cone: [20, 45],
 } as unknown as Light;
-const sun = { kind: "directional", ...common, direction: [0, -1, 0] } as unknown as Light;
+const sun = { kind: "directional", ...common, direction: [0, -1, 0], angle: 0 } as unknown as Light;
 
 describe("a point in the picture", () => {
   test("is where the camera sees it", () => {
@@ -107,6 +107,14 @@ describe("handles", () => {
     const [a, b, c] = lightOutline(panel as unknown as Light) as [Triple, Triple, Triple];
     expect([length(subtract(a, b)), length(subtract(b, c))]).toEqual([2, 1]);
     for (const point of lightOutline(spot)) expect(length(point)).toBeCloseTo(2, 9); // 45° from 2 m above
+    const shape = (fields: object) => lightOutline({ ...common, position: [1, 2, 3], ...fields } as unknown as Light);
+    const away = (points: Triple[]) => points.map((point) => length(subtract(point, [1, 2, 3])));
+    for (const distance of away(shape({ kind: "disc", direction: [0, -2, 0], radius: 0.5 })))
+      expect(distance).toBeCloseTo(0.5, 9);
+    for (const distance of away(shape({ kind: "sphere", radius: 0.5 }))) expect(distance).toBeCloseTo(0.5, 9);
+    const tube = shape({ kind: "tube", direction: [3, 0, 0], radius: 0.3, length: 0.8 });
+    for (const distance of away(tube)) expect(distance).toBeCloseTo(0.5, 9); // 0.3, 0.4, 0.5
+    expect(Math.max(...tube.map(([x]) => x)) - Math.min(...tube.map(([x]) => x))).toBeCloseTo(0.8, 9);
   });
 });
 
@@ -135,6 +143,12 @@ describe("a new light", () => {
   test("gives the same irradiance whatever its kind", () => {
     const panel = on("rectangle") as Extract<Light, { kind: "rectangle" }>;
     expect(panel.emission[0] * panel.size[0] * panel.size[1]).toBeCloseTo(3, 1);
+    const disc = on("disc") as Extract<Light, { kind: "disc" }>;
+    expect(disc.emission[0] * Math.PI * disc.radius ** 2).toBeCloseTo(3, 1);
+    const sphere = on("sphere") as Extract<Light, { kind: "sphere" }>;
+    expect(sphere.emission[0] * Math.PI * sphere.radius ** 2).toBeCloseTo(3, 1);
+    const tube = on("tube") as Extract<Light, { kind: "tube" }>;
+    expect(tube.emission[0] * 2 * tube.radius * tube.length).toBeCloseTo(3, 1);
   });
 
   test("has a name of its own", () => {
@@ -160,7 +174,9 @@ describe("the inspector's fields", () => {
 
   test("are those that the kind has", () => {
     expect(labels(spot)).toEqual(["Position", "Direction", "Inner cone", "Outer cone"]);
-    expect(labels(sun)).toEqual(["Direction"]);
+    expect(labels(sun)).toEqual(["Direction", "Angle"]);
+    const tube = { kind: "tube", ...common, position: [0, 1, 0], direction: [1, 0, 0], radius: 0.1, length: 1 };
+    expect(labels(tube as unknown as Light)).toEqual(["Position", "Direction", "Radius", "Length"]);
   });
 
   test("of a cone push each other, so that the edge never lies within", () => {

@@ -198,7 +198,7 @@ class DirectionalLook(_LightLook):
 
     kind: Literal["directional"]
     direction: Xyz
-    angle: float = 0.0
+    angle: float
 
 
 class RectangleLook(_LightLook):

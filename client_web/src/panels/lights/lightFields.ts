@@ -4,11 +4,12 @@ import type { Light, Triple } from "../../protocol";
 import { length } from "./vector";
 
 type Spot = Extract<Light, { kind: "spot" }>;
+type Sun = Extract<Light, { kind: "directional" }>;
 type Rectangle = Extract<Light, { kind: "rectangle" }>;
 
 /** A few numbers on one line. */
 export interface NumbersField {
-  field: "position" | "direction" | "size";
+  field: "position" | "direction" | "size" | "radius" | "length";
   editLabel: string;
   label: string;
   unit: string;
@@ -52,11 +53,29 @@ const NUMBERS: readonly NumbersField[] = [
     ...RANGES.light.size,
     step: 0.01,
   },
+  {
+    field: "radius",
+    editLabel: "Size",
+    label: "Radius",
+    unit: "m",
+    names: ["r"],
+    ...RANGES.light.radius,
+    step: 0.01,
+  },
+  {
+    field: "length",
+    editLabel: "Size",
+    label: "Length",
+    unit: "m",
+    names: ["l"],
+    ...RANGES.light.length,
+    step: 0.01,
+  },
 ];
 
 /** An angle in degrees, for the kinds of light that have its field. */
 export interface AngleField {
-  field: "rotation" | "cone";
+  field: "rotation" | "cone" | "angle";
   editLabel: string;
   label: string;
   minimum: number;
@@ -69,6 +88,14 @@ export interface AngleField {
 const cone = (light: Light) => (light as Spot).cone;
 
 const ANGLES: readonly AngleField[] = [
+  {
+    field: "angle",
+    editLabel: "Angle",
+    label: "Angle",
+    ...RANGES.light.angle,
+    valueOf: (light) => (light as Sun).angle,
+    changeFor: (_, angle) => angle,
+  },
   {
     field: "rotation",
     editLabel: "Rotate",
