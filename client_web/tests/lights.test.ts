@@ -174,7 +174,7 @@ describe("the inspector's fields", () => {
 
   test("are those that the kind has", () => {
     expect(labels(spot)).toEqual(["Position", "Direction", "Inner cone", "Outer cone"]);
-    expect(labels(sun)).toEqual(["Direction", "Angle"]);
+    expect(labels(sun)).toEqual(["Direction", "Azimuth", "Elevation", "Angle"]);
     const tube = { kind: "tube", ...common, position: [0, 1, 0], direction: [1, 0, 0], radius: 0.1, length: 1 };
     expect(labels(tube as unknown as Light)).toEqual(["Position", "Direction", "Radius", "Length"]);
   });
@@ -184,6 +184,16 @@ describe("the inspector's fields", () => {
     expect(inner?.changeFor(spot, 60)).toEqual([60, 60]);
     expect(edge?.changeFor(spot, 10)).toEqual([10, 10]);
     expect([inner?.valueOf(spot), edge?.valueOf(spot)]).toEqual([20, 45]);
+  });
+
+  test("of a sun are its azimuth from −Z over +X and its elevation", () => {
+    const fromEast = { ...sun, direction: [-2, -2, 0] } as unknown as Light;
+    const [azimuth, elevation] = angleFieldsOf(fromEast);
+    expect(azimuth?.valueOf(fromEast)).toBeCloseTo(90, 9);
+    expect(elevation?.valueOf(fromEast)).toBeCloseTo(45, 9);
+    const north = azimuth?.changeFor(fromEast, 0) as Triple;
+    close(north, [0, -Math.SQRT1_2, Math.SQRT1_2]);
+    close(elevation?.changeFor(fromEast, 0) as Triple, [-1, 0, 0]);
   });
 
   test("refuse a direction without length", () => {

@@ -1,6 +1,7 @@
 /** Numeric and angle fields of a light in the inspector: label, range and changes. */
 import { RANGES } from "../../look.gen";
 import type { Light, Triple } from "../../protocol";
+import { directionFrom, sunPosition } from "./sunPosition";
 import { length } from "./vector";
 
 type Spot = Extract<Light, { kind: "spot" }>;
@@ -73,9 +74,14 @@ const NUMBERS: readonly NumbersField[] = [
   },
 ];
 
+/** At 90° the azimuth would be lost. */
+const MAX_ELEVATION = 89.9;
+
 /** An angle in degrees, for the kinds of light that have its field. */
 export interface AngleField {
-  field: "rotation" | "cone" | "angle";
+  field: "rotation" | "cone" | "angle" | "direction";
+  /** The only kind of light with it, if others have the field, too. */
+  kind?: Light["kind"];
   editLabel: string;
   label: string;
   minimum: number;
@@ -88,6 +94,26 @@ export interface AngleField {
 const cone = (light: Light) => (light as Spot).cone;
 
 const ANGLES: readonly AngleField[] = [
+  {
+    field: "direction",
+    kind: "directional",
+    editLabel: "Aim",
+    label: "Azimuth",
+    minimum: -180,
+    maximum: 180,
+    valueOf: (light) => sunPosition((light as Sun).direction).azimuth,
+    changeFor: (light, azimuth) => directionFrom({ ...sunPosition((light as Sun).direction), azimuth }),
+  },
+  {
+    field: "direction",
+    kind: "directional",
+    editLabel: "Aim",
+    label: "Elevation",
+    minimum: -MAX_ELEVATION,
+    maximum: MAX_ELEVATION,
+    valueOf: (light) => sunPosition((light as Sun).direction).elevation,
+    changeFor: (light, elevation) => directionFrom({ ...sunPosition((light as Sun).direction), elevation }),
+  },
   {
     field: "angle",
     editLabel: "Angle",
@@ -125,4 +151,5 @@ const ANGLES: readonly AngleField[] = [
 ];
 
 export const numbersFieldsOf = (light: Light) => NUMBERS.filter(({ field }) => field in light);
-export const angleFieldsOf = (light: Light) => ANGLES.filter(({ field }) => field in light);
+export const angleFieldsOf = (light: Light) => 
+  ANGLES.filter(({ field, kind }) => field in light && (kind ?? light.kind) === light.kind);
