@@ -151,5 +151,5 @@ const ANGLES: readonly AngleField[] = [
 ];
 
 export const numbersFieldsOf = (light: Light) => NUMBERS.filter(({ field }) => field in light);
-export const angleFieldsOf = (light: Light) => 
+export const angleFieldsOf = (light: Light) =>
   ANGLES.filter(({ field, kind }) => field in light && (kind ?? light.kind) === light.kind);
