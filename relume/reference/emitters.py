@@ -18,7 +18,7 @@ from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.raytrace.texture import MipMap
-from relume.reference.shape_samples import sample_shape, sample_sun
+from relume.reference.shape_samples import sample_shape, sample_sun, strata
 from relume.scene.model import Scene, Texture
 
 F32 = NDArray[np.float32]
@@ -185,12 +185,8 @@ def _sample_rectangle(
     up = np.cross(facing, across)
     width = np.cos(rotation) * across + np.sin(rotation) * up
     height = np.cos(rotation) * up - np.sin(rotation) * across
-    side = max(1, round(np.sqrt(num)))
-    stratum = np.arange(side * side)
-    u, v = (np.stack([stratum % side, stratum // side]) + rng.random((num_points, 2, side * side))).transpose(
-        1, 0, 2
-    ) / side
-    offset = light.size[0] * (u - 0.5)[..., None] * width + light.size[1] * (v - 0.5)[..., None] * height
+    u, v = strata(num_points, num, rng)
+    offset = light.size[0] * (u - 0.5) * width + light.size[1] * (v - 0.5) * height
     return np.array(light.position) + offset, facing, light.size[0] * light.size[1]
 
 

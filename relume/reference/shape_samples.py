@@ -1,4 +1,4 @@
-"""Random points on discs, spheres and tubes, uniform by area, and random directions to sun disks; float64."""
+"""Stratified points on discs, spheres and tubes, uniform by area, and directions to sun disks; float64."""
 
 from __future__ import annotations
 
@@ -30,8 +30,10 @@ def sample_shape(light: LightLook, num_points: int, num: int, rng: np.random.Gen
     if isinstance(light, DiscLook):
         offset, normal, area = _disc(light, num_points, num, rng)
     elif isinstance(light, SphereLook):
-        normal = rng.normal(size=(num_points, num, 3))
-        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        u, v = strata(num_points, num, rng)
+        height, azimuth = 1 - 2 * u, 2 * np.pi * v
+        sine = np.sqrt(1 - height**2)
+        normal = np.concatenate([sine * np.cos(azimuth), height, sine * np.sin(azimuth)], axis=2)
         offset, area = light.radius * normal, 4 * np.pi * light.radius**2
     elif isinstance(light, TubeLook):
         offset, normal, area = _tube(light, num_points, num, rng)
@@ -48,26 +50,36 @@ def sample_sun(light: DirectionalLook, num_points: int, num: int, rng: np.random
     """
     axis, across, up = _axes(light.direction)
     half_angle = np.radians(light.angle / 2)
-    cosine = 1 - (1 - np.cos(half_angle)) * rng.random((num_points, num, 1))
-    azimuth, sine = 2 * np.pi * rng.random((num_points, num, 1)), np.sqrt(1 - cosine**2)
+    u, v = strata(num_points, num, rng)
+    cosine, azimuth = 1 - (1 - np.cos(half_angle)) * u, 2 * np.pi * v
+    sine = np.sqrt(1 - cosine**2)
     direction = sine * (np.cos(azimuth) * across + np.sin(azimuth) * up) - cosine * axis
     solid_angle = 2 * np.pi * (1 - np.cos(half_angle))
-    return direction, float(solid_angle / (np.pi * np.sin(half_angle) ** 2 * num))
+    return direction, float(solid_angle / (np.pi * np.sin(half_angle) ** 2 * direction.shape[1]))
+
+
+def strata(num_points: int, num: int, rng: np.random.Generator) -> tuple[Shaped[F64, "n m 1"], Shaped[F64, "n m 1"]]:
+    """Return a random point of the unit square in each cell of a grid; m is the square number nearest to num."""
+    side = max(1, round(np.sqrt(num)))
+    cell = np.stack([*np.divmod(np.arange(side * side), side)])
+    u, v = (cell + rng.random((num_points, 2, side * side))).transpose(1, 0, 2)[..., None] / side
+    return u, v
 
 
 def _disc(light: DiscLook, num_points: int, num: int, rng: np.random.Generator) -> tuple[F64, F64, float]:
     axis, across, up = _axes(light.direction)
-    radius = light.radius * np.sqrt(rng.random((num_points, num, 1)))
-    azimuth = 2 * np.pi * rng.random((num_points, num, 1))
+    u, v = strata(num_points, num, rng)
+    radius, azimuth = light.radius * np.sqrt(u), 2 * np.pi * v
     offset = radius * (np.cos(azimuth) * across + np.sin(azimuth) * up)
     return offset, np.broadcast_to(axis, offset.shape), np.pi * light.radius**2
 
 
 def _tube(light: TubeLook, num_points: int, num: int, rng: np.random.Generator) -> tuple[F64, F64, float]:
     axis, across, up = _axes(light.direction)
-    azimuth = 2 * np.pi * rng.random((num_points, num, 1))
+    u, v = strata(num_points, num, rng)
+    azimuth = 2 * np.pi * v
     normal = np.cos(azimuth) * across + np.sin(azimuth) * up
-    along = light.length * (rng.random((num_points, num, 1)) - 0.5)
+    along = light.length * (u - 0.5)
     return light.radius * normal + along * axis, normal, 2 * np.pi * light.radius * light.length
 
 
