@@ -45,6 +45,8 @@ def sample_shape(light: LightLook, num_points: int, num: int, rng: np.random.Gen
 def sample_sun(light: DirectionalLook, num_points: int, num: int, rng: np.random.Generator) -> tuple[F64, float]:
     """Sample directions to a sun disk, uniform by solid angle.
 
+    Args:
+        light: the light. num_points: n. num: number of samples of each. rng: random number generator.
     Returns:
         Unit directions (n, m, 3), and the irradiance facing each, of a light of unit irradiance.
     """
@@ -59,7 +61,11 @@ def sample_sun(light: DirectionalLook, num_points: int, num: int, rng: np.random
 
 
 def strata(num_points: int, num: int, rng: np.random.Generator) -> tuple[Shaped[F64, "n m 1"], Shaped[F64, "n m 1"]]:
-    """Return a random point of the unit square in each cell of a grid; m is the square number nearest to num."""
+    """Return a random point of the unit square in each cell of a grid.
+
+    Args:
+        num_points: n. num: number of samples of each; m is the square number nearest to it. rng: random number generator.
+    """
     side = max(1, round(np.sqrt(num)))
     cell = np.stack([*np.divmod(np.arange(side * side), side)])
     u, v = (cell + rng.random((num_points, 2, side * side))).transpose(1, 0, 2)[..., None] / side
