@@ -64,7 +64,7 @@ def strata(num_points: int, num: int, rng: np.random.Generator) -> tuple[Shaped[
     """Return a random point of the unit square in each cell of a grid.
 
     Args:
-        num_points: n. num: number of samples of each; m is the square number nearest to it. rng: random number generator.
+        num_points: n. num: number of samples of each; m is the nearest square number. rng: generator.
     """
     side = max(1, round(np.sqrt(num)))
     cell = np.stack([*np.divmod(np.arange(side * side), side)])
