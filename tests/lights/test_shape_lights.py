@@ -124,7 +124,7 @@ RECTANGLE = LightGeometry("rectangle", tuple(POSITION), tuple(AXIS), rotation=20
 
 @pytest.mark.parametrize("geometry", [DISC, SPHERE, TUBE, RECTANGLE], ids=lambda geometry: geometry.kind)
 def test_rays_hit_a_shape_as_often_as_its_area_says(geometry):
-    """Of parallel rays through a disc of radius 1 around it, the share of its projected area."""
+    """The fraction of parallel rays through a disc of radius 1 that hit is the projected area over π."""
     rng = np.random.default_rng(2)
     towards = -AXIS * 0.8 + np.cross(AXIS, [0, 0, 1.0]) / np.linalg.norm(np.cross(AXIS, [0, 0, 1.0])) * 0.6
     sine = 0.6
