@@ -6,7 +6,7 @@ import numpy as np
 
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.equirect import texel_directions
-from relume.lights.local_lights import LightTriangles
+from relume.lights.shape_triangles import LightTriangles
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import any_tangent
 from relume.scene.model import Camera, Material, Mesh, Scene, Texture

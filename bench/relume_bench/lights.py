@@ -5,7 +5,8 @@ The Cornell box, 128×128 pixels, diffuse; the environment is black. Images are 
 pixels, with Mitsuba's noise removed: a pixel has one view sample inside surfaces and many in Mitsuba, which differ
 along the edges of hard shadows. Mitsuba's spot falls off in angle and ours in cosine: the compared cone has an edge of
 a tenth of a degree. Mitsuba has no links: for the linked light, surfaces that are not linked are black there and still
-cast shadows, which is the same direct light. For the installation of Mitsuba see bench/relume_bench/mitsuba.py.
+cast shadows, which is the same direct light. Its sun is a disk 1 km away. For the installation of Mitsuba see
+bench/relume_bench/mitsuba.py.
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
 from relume.core.cache import Cache
-from relume.lights.local_lights import rectangle
+from relume.lights.light_axes import light_axes
+from relume.lights.surface_hits import surface_radiance
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.opened.openers import open_transfer
-from relume.look import Look, validate
+from relume.look import LightGeometry, Look, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.cornell import cornell_box
@@ -55,8 +57,19 @@ _LIGHTS: dict[str, dict[str, Any]] = {
         "kind": "rectangle", "position": [0.1, 2.3, 1.3], "direction": [0.0, -0.7, -1.0], "rotation": 20.0,
         "size": [0.5, 0.3], "emission": [20.0, 18.0, 15.0],
     },
+    "disc": {
+        "kind": "disc", "position": [0.1, 2.3, 1.3], "direction": [0.0, -0.7, -1.0], "radius": 0.2,
+        "emission": [20.0, 18.0, 15.0],
+    },
+    "sphere": {"kind": "sphere", "position": [0.1, 2.3, 1.3], "radius": 0.15, "emission": [40.0, 36.0, 30.0]},
+    "tube": {
+        "kind": "tube", "position": [0.1, 2.3, 1.3], "direction": [1.0, 0.1, 0.0], "radius": 0.03, "length": 1.2,
+        "emission": [40.0, 36.0, 30.0],
+    },
+    "sun": {"kind": "directional", "direction": [-0.4, -1.0, -0.5], "angle": 5.0, "emission": [2.0, 2.0, 2.0]},
 }  # fmt: skip
 _BLOCK = 4
+_SUN_DISTANCE = 1000.0  # meters, of Mitsuba's sun disk
 _NAMES = tuple(f"lights.rmse_{kind}" for kind in _LIGHTS)
 _FPS = "lights.intensity_fps"
 
@@ -115,24 +128,43 @@ def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, An
     emission = {"type": "rgb", "value": light["emission"]}
     if light["kind"] == "point":
         return {"type": "point", "position": light["position"], "intensity": emission}
+    if (shape := _mitsuba_shape(geometry)) is not None:
+        radiance = surface_radiance(geometry) * np.array(light["emission"])
+        return {**shape, "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance.tolist()}}}
     if light["kind"] == "directional":
         return {"type": "directional", "direction": light["direction"], "irradiance": emission}
     to_world = np.eye(4)
-    if light["kind"] == "spot":
-        forward = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
-        right = np.cross([1.0, 0.0, 0.0], forward)
-        right /= np.linalg.norm(right)
-        to_world[:3, :3] = np.stack([np.cross(forward, right), right, forward], axis=1)
-        to_world[:3, 3] = geometry.position
-        inner, outer = geometry.cone
-        angles = {"beam_width": inner, "cutoff_angle": outer}
-        return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles}
-    corner, edges = rectangle(geometry)  # Mitsuba's rectangle covers [-1, 1]²
-    to_world[:3, :2] = edges.T / 2
-    to_world[:3, 2] = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
-    to_world[:3, 3] = corner + edges.sum(axis=0) / 2
-    area = {"type": "area", "radiance": emission}
-    return {"type": "rectangle", "emitter": area, "to_world": to_world.ravel().tolist()}
+    to_world[:3, :3] = light_axes(geometry.direction).T
+    to_world[:3, 3] = geometry.position
+    inner, outer = geometry.cone
+    angles = {"beam_width": inner, "cutoff_angle": outer}
+    return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles}
+
+
+def _mitsuba_shape(geometry: LightGeometry) -> dict[str, Any] | None:
+    """The surface of a light; of a soft sun, a disk at a distance. None for a light without one."""
+    position, radius = np.array(geometry.position), geometry.radius
+    *sides, facing = light_axes(geometry.direction, geometry.rotation)
+    match geometry.kind:
+        case "sphere":
+            return {"type": "sphere", "center": position.tolist(), "radius": radius}
+        case "tube":
+            ends = {
+                f"p{k}": (position + sign * geometry.length / 2 * facing).tolist() for k, sign in enumerate((-1, 1))
+            }
+            return {"type": "cylinder", **ends, "radius": radius}
+        case "rectangle":  # Mitsuba's covers [-1, 1]²
+            shape, sides = "rectangle", [side * size / 2 for side, size in zip(sides, geometry.size, strict=True)]
+        case "disc":
+            shape, sides = "disk", [side * radius for side in sides]
+        case "directional" if geometry.angle > 0:
+            shape, sides = "disk", [side * _SUN_DISTANCE * np.tan(np.radians(geometry.angle / 2)) for side in sides]
+            position = -_SUN_DISTANCE * facing
+        case _:
+            return None
+    to_world = np.eye(4)
+    to_world[:3] = np.column_stack([*sides, facing, position])
+    return {"type": shape, "to_world": to_world.ravel().tolist()}
 
 
 def _gain_fps(folder: Path, tiny: bool) -> Figure:

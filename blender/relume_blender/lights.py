@@ -22,6 +22,7 @@ F64 = NDArray[np.float64]
 Look = Mapping[str, Any]
 
 KINDS = {"POINT": "point", "SPOT": "spot", "SUN": "directional", "AREA": "rectangle"}
+_TYPES = {kind: name for name, kind in KINDS.items()} | {"disc": "AREA", "sphere": "POINT", "tube": "POINT"}
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From Blender's axes to those of looks and glTF."""
 _EDGE = 0.75
@@ -82,8 +83,11 @@ def to_look(light: BlenderLight, *, enabled: bool = True) -> dict[str, Any]:
 
 
 def from_look(light: Look) -> BlenderLight:
-    """Return the light of Blender for a complete light of a look other than an emissive mesh."""
-    type_ = {kind: name for name, kind in KINDS.items()}[light["kind"]]
+    """Return the light of Blender for a complete light of a look other than an emissive mesh.
+
+    A disc becomes a square of its area, a sphere or a tube a point light of its power.
+    """
+    type_ = _TYPES[light["kind"]]
     gain = [light["intensity"] * c * e for c, e in zip(light["color"], light["emission"], strict=True)]
     strength = max(gain)
     color = tuple(channel / strength for channel in gain) if strength > 0 else (1.0, 1.0, 1.0)
@@ -96,8 +100,10 @@ def from_look(light: Look) -> BlenderLight:
     to_world[:3, 1], to_world[:3, 2] = Y_UP.T @ height_axis, -(Y_UP.T @ direction)
     to_world[:3, 0] = np.cross(to_world[:3, 1], to_world[:3, 2])
     to_world[:3, 3] = Y_UP.T @ np.array(light.get("position", (0.0, 0.0, 0.0)))
-    width, height = light.get("size", (0.0, 0.0))
-    scale = {"AREA": math.pi * width * height, "SUN": 1.0}.get(type_, 4 * math.pi)
+    radius = light.get("radius", 0.0)
+    width, height = light.get("size", (math.sqrt(math.pi) * radius,) * 2)
+    point_scale = {"sphere": 4 * (math.pi * radius) ** 2, "tube": 2 * math.pi**2 * radius * light.get("length", 0.0)}
+    scale = {"AREA": math.pi * width * height, "SUN": 1.0}.get(type_, point_scale.get(light["kind"], 4 * math.pi))
     inner, outer = (math.radians(angle) for angle in light.get("cone", (0.0, 0.0)))
     blend = (math.cos(inner) - math.cos(outer)) / (_EDGE * (1 - math.cos(outer))) if outer > 0 else 0.0
     return BlenderLight(

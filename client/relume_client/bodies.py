@@ -156,6 +156,22 @@ class DirectionalLook(TypedDict):
     shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["directional"]]
     direction: NotRequired[Sequence[float]]
+    angle: NotRequired[float]
+
+
+class DiscLook(TypedDict):
+    """A disc that emits toward `direction`; emission is radiance. The camera does not see it. `radius`: meters."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["disc"]]
+    position: NotRequired[Sequence[float]]
+    direction: NotRequired[Sequence[float]]
+    radius: NotRequired[float]
 
 
 class DisplayLook(TypedDict):
@@ -334,7 +350,7 @@ class LookDocument(TypedDict):
     materials: NotRequired[Mapping[str, MaterialLook]]
     environment: NotRequired[EnvironmentLook]
     background: NotRequired[BackgroundLook]
-    lights: NotRequired[Mapping[str, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook | PointsLook | PanelsLook]]
+    lights: NotRequired[Mapping[str, PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook | PointsLook | PanelsLook]]
     light_groups: NotRequired[Mapping[str, LightGroupLook]]
     transport: NotRequired[TransportLook]
     display: NotRequired[DisplayLook]
@@ -723,6 +739,20 @@ class SharedOperation(TypedDict):
     value: Any
 
 
+class SphereLook(TypedDict):
+    """A sphere; emission is radiance. The camera does not see it. `radius`: meters."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["sphere"]]
+    position: NotRequired[Sequence[float]]
+    radius: NotRequired[float]
+
+
 class SpotLook(TypedDict):
     """A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr."""
 
@@ -773,6 +803,22 @@ class TransportLook(TypedDict):
 
     show: NotRequired[Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]]
     bounces: NotRequired[int]
+
+
+class TubeLook(TypedDict):
+    """A tube, whose side emits and whose ends do not; emission is radiance. The camera does not see it."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["tube"]]
+    position: NotRequired[Sequence[float]]
+    direction: NotRequired[Sequence[float]]
+    radius: NotRequired[float]
+    length: NotRequired[float]
 
 
 class Turntable(TypedDict):

@@ -8,7 +8,7 @@ export interface BackgroundLook {
   blur: number;
 }
 
-/** Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m². */
+/** Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m². `angle`: diameter of the disk that it comes from, degrees; 0 for parallel light. */
 export interface DirectionalLook {
   intensity: number;
   color: [number, number, number];
@@ -18,6 +18,21 @@ export interface DirectionalLook {
   shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "directional";
   direction: [number, number, number];
+  angle: number;
+}
+
+/** A disc that emits toward `direction`; emission is radiance. The camera does not see it. `radius`: meters. */
+export interface DiscLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "disc";
+  position: [number, number, number];
+  direction: [number, number, number];
+  radius: number;
 }
 
 /** Conversion from radiance to display: `exposure` in stops, then the tone map or an OpenColorIO view. */
@@ -76,7 +91,7 @@ export interface Look {
   materials: Record<string, MaterialLook>;
   environment: EnvironmentLook;
   background: BackgroundLook;
-  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook | PointsLook | PanelsLook>;
+  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook | PointsLook | PanelsLook>;
   light_groups: Record<string, LightGroupLook>;
   transport: TransportLook;
   display: DisplayLook;
@@ -167,6 +182,19 @@ export interface RectangleLook {
   size: [number, number];
 }
 
+/** A sphere; emission is radiance. The camera does not see it. `radius`: meters. */
+export interface SphereLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "sphere";
+  position: [number, number, number];
+  radius: number;
+}
+
 /** A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr. */
 export interface SpotLook {
   intensity: number;
@@ -204,11 +232,29 @@ export interface TransportLook {
   bounces: number;
 }
 
+/** A tube, whose side emits and whose ends do not; emission is radiance. The camera does not see it. `position`: its middle. `direction`: its axis. `radius`, `length`: meters. */
+export interface TubeLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "tube";
+  position: [number, number, number];
+  direction: [number, number, number];
+  radius: number;
+  length: number;
+}
+
 export type LightLook =
   | PointLook
   | SpotLook
   | DirectionalLook
   | RectangleLook
+  | DiscLook
+  | SphereLook
+  | TubeLook
   | MeshLook
   | PointsLook
   | PanelsLook;
@@ -219,8 +265,11 @@ type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { ki
 export const DEFAULT_LIGHTS: LightsByKind = {
   point: { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0] },
   spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
-  directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, direction: [0, -1, 0] },
+  directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, direction: [0, -1, 0], angle: 0 },
   rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
+  disc: { kind: "disc", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], radius: 0.25 },
+  sphere: { kind: "sphere", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], radius: 0.1 },
+  tube: { kind: "tube", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [1, 0, 0], radius: 0.02, length: 1 },
   mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, material: "", image: null },
   points: { kind: "points", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
   panels: { kind: "panels", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
@@ -239,7 +288,7 @@ export const RANGES = {
   background: { color: { minimum: 0, maximum: 10000 }, blur: { minimum: 2, maximum: 60 } },
   transport: { bounces: { minimum: 0, maximum: 24 } },
   display: { exposure: { minimum: -20, maximum: 20 } },
-  light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000000000 }, position: { minimum: -1000000000, maximum: 1000000000 }, direction: { minimum: -1000000000, maximum: 1000000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 1e-08, maximum: 100000000 }, cone: { minimum: 0, maximum: 90 } },
+  light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000000000 }, position: { minimum: -1000000000, maximum: 1000000000 }, direction: { minimum: -1000000000, maximum: 1000000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 1e-08, maximum: 100000000 }, radius: { minimum: 0.0001, maximum: 10000 }, length: { minimum: 0.0001, maximum: 10000 }, angle: { minimum: 0, maximum: 30 }, cone: { minimum: 0, maximum: 90 } },
   glass: { color: { minimum: 0, maximum: 1 }, absorption: { minimum: 0, maximum: 1000000 }, roughness: { minimum: 0, maximum: 1 }, ior: { minimum: 1, maximum: 4 } },
   term: { color: { minimum: 0, maximum: 10000 } },
 } as const;

@@ -23,6 +23,9 @@ describe("the power of a light", () => {
   test("is what it sends into all directions", () => {
     expect(wattsOf(light({ kind: "point" }))).toBeCloseTo(4 * Math.PI, 6);
     expect(wattsOf(light({ kind: "rectangle", size: [2, 0.5] }))).toBeCloseTo(Math.PI, 6);
+    expect(wattsOf(light({ kind: "disc", radius: 2 }))).toBeCloseTo(4 * Math.PI ** 2, 6);
+    expect(wattsOf(light({ kind: "sphere", radius: 2 }))).toBeCloseTo(16 * Math.PI ** 2, 6);
+    expect(wattsOf(light({ kind: "tube", radius: 2, length: 3 }))).toBeCloseTo(12 * Math.PI ** 2, 6);
     for (const cone of [
       [20, 30],
       [0, 90],

@@ -45,7 +45,7 @@ const spot = {
   direction: [0, -2, 0],
   cone: [20, 45],
 } as unknown as Light;
-const sun = { kind: "directional", ...common, direction: [0, -1, 0] } as unknown as Light;
+const sun = { kind: "directional", ...common, direction: [0, -1, 0], angle: 0 } as unknown as Light;
 
 describe("a point in the picture", () => {
   test("is where the camera sees it", () => {
@@ -114,6 +114,14 @@ describe("handles", () => {
     const [a, b, c] = lightOutline(panel as unknown as Light) as [Triple, Triple, Triple];
     expect([length(subtract(a, b)), length(subtract(b, c))]).toEqual([2, 1]);
     for (const point of lightOutline(spot)) expect(length(point)).toBeCloseTo(2, 9); // 45° from 2 m above
+    const shape = (fields: object) => lightOutline({ ...common, position: [1, 2, 3], ...fields } as unknown as Light);
+    const away = (points: Triple[]) => points.map((point) => length(subtract(point, [1, 2, 3])));
+    for (const distance of away(shape({ kind: "disc", direction: [0, -2, 0], radius: 0.5 })))
+      expect(distance).toBeCloseTo(0.5, 9);
+    for (const distance of away(shape({ kind: "sphere", radius: 0.5 }))) expect(distance).toBeCloseTo(0.5, 9);
+    const tube = shape({ kind: "tube", direction: [3, 0, 0], radius: 0.3, length: 0.8 });
+    for (const distance of away(tube)) expect(distance).toBeCloseTo(0.5, 9); // 0.3, 0.4, 0.5
+    expect(Math.max(...tube.map(([x]) => x)) - Math.min(...tube.map(([x]) => x))).toBeCloseTo(0.8, 9);
   });
 });
 
@@ -142,6 +150,12 @@ describe("a new light", () => {
   test("gives the same irradiance whatever its kind", () => {
     const panel = on("rectangle") as Extract<Light, { kind: "rectangle" }>;
     expect(panel.emission[0] * panel.size[0] * panel.size[1]).toBeCloseTo(3, 1);
+    const disc = on("disc") as Extract<Light, { kind: "disc" }>;
+    expect(disc.emission[0] * Math.PI * disc.radius ** 2).toBeCloseTo(3, 1);
+    const sphere = on("sphere") as Extract<Light, { kind: "sphere" }>;
+    expect(sphere.emission[0] * Math.PI * sphere.radius ** 2).toBeCloseTo(3, 1);
+    const tube = on("tube") as Extract<Light, { kind: "tube" }>;
+    expect(tube.emission[0] * 2 * tube.radius * tube.length).toBeCloseTo(3, 1);
   });
 
   test("has a name of its own", () => {
@@ -167,7 +181,9 @@ describe("the inspector's fields", () => {
 
   test("are those that the kind has", () => {
     expect(labels(spot)).toEqual(["Position", "Direction", "Inner cone", "Outer cone"]);
-    expect(labels(sun)).toEqual(["Direction"]);
+    expect(labels(sun)).toEqual(["Direction", "Azimuth", "Elevation", "Angle"]);
+    const tube = { kind: "tube", ...common, position: [0, 1, 0], direction: [1, 0, 0], radius: 0.1, length: 1 };
+    expect(labels(tube as unknown as Light)).toEqual(["Position", "Direction", "Radius", "Length"]);
   });
 
   test("of a cone push each other, so that the edge never lies within", () => {
@@ -175,6 +191,16 @@ describe("the inspector's fields", () => {
     expect(inner?.changeFor(spot, 60)).toEqual([60, 60]);
     expect(edge?.changeFor(spot, 10)).toEqual([10, 10]);
     expect([inner?.valueOf(spot), edge?.valueOf(spot)]).toEqual([20, 45]);
+  });
+
+  test("of a sun are its azimuth from −Z over +X and its elevation", () => {
+    const fromEast = { ...sun, direction: [-2, -2, 0] } as unknown as Light;
+    const [azimuth, elevation] = angleFieldsOf(fromEast);
+    expect(azimuth?.valueOf(fromEast)).toBeCloseTo(90, 9);
+    expect(elevation?.valueOf(fromEast)).toBeCloseTo(45, 9);
+    const north = azimuth?.changeFor(fromEast, 0) as Triple;
+    close(north, [0, -Math.SQRT1_2, Math.SQRT1_2]);
+    close(elevation?.changeFor(fromEast, 0) as Triple, [-1, 0, 0]);
   });
 
   test("refuse a direction without length", () => {

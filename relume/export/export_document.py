@@ -12,7 +12,7 @@ from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial, MaterialExporter
 from relume.look import Look, default_look, validate
 from relume.look.light_mix import expand_light_mix
-from relume.look.model import RectangleLook, SingleLightLook
+from relume.look.model import AreaLook, SingleLightLook
 from relume.look.single_lights import single_lights
 from relume.scene.model import Scene
 
@@ -57,9 +57,9 @@ class ExportDocument:
         return replacements
 
     def lights(self) -> Iterator[tuple[str, SingleLightLook]]:
-        """Lights other than emissive materials; rectangles only if they emit."""
+        """Lights other than emissive materials; area lights only if they emit."""
         for name, light in single_lights(self.scene, self.look).items():
-            if light.kind != "mesh" and not (isinstance(light, RectangleLook) and max(light.gain) == 0):
+            if light.kind != "mesh" and not (isinstance(light, AreaLook) and max(light.gain) == 0):
                 yield name, light
 
 

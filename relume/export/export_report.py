@@ -8,7 +8,7 @@ from typing import Any
 from relume.core.import_warnings import quote
 from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial
-from relume.look.model import RectangleLook
+from relume.look.model import AreaLook
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,7 @@ def omitted_from_scene_files(export: ExportDocument) -> tuple[str, ...]:
     """Sentences about a look that no file with materials has."""
     display, transport = export.look.display, export.look.transport
     sentences = {
-        "Area lights become visible emissive rectangles.": any(
-            isinstance(light, RectangleLook) for _, light in export.lights()
-        ),
+        "Area lights become visible emissive meshes.": any(isinstance(light, AreaLook) for _, light in export.lights()),
         "Exposure and tone mapping are settings of the program that opens the file.": display.exposure != 0,
         "All light paths are exported, not only those that the look shows.": transport.show != "all",
         "Variants replace materials; lights and environment are those of the exported look.": bool(export.variants),

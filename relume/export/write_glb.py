@@ -22,8 +22,8 @@ from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial, emissive_surface
 from relume.export.glb_buffer import INDICES, GlbBuffer
 from relume.export.gltf_materials import GltfMaterials
-from relume.export.light_frames import light_frame
-from relume.look.model import RectangleLook, SingleLightLook
+from relume.export.light_frames import light_frame, local_triangles
+from relume.look.model import AreaLook, SingleLightLook
 from relume.raytrace.tangents import any_tangent, unit
 from relume.scene.model import WRAPS, Camera, Mesh
 from relume.scene_io.gltf.lights import EXTENSION as PUNCTUAL
@@ -145,9 +145,9 @@ class _GlbDocument:
         return primitive
 
     def _light(self, name: str, light: SingleLightLook) -> dict[str, Any]:
-        """Members of the node of a light; a rectangle is an emissive mesh."""
-        if isinstance(light, RectangleLook):
-            return {"mesh": self._add_rectangle(name, light)}
+        """Members of the node of a light; an area light is an emissive mesh."""
+        if isinstance(light, AreaLook):
+            return {"mesh": self._add_area_light(name, light)}
         strength = max(light.gain)
         fields: dict[str, Any] = {"name": name, "type": light.kind, "intensity": strength * LUMENS_PER_WATT}
         if strength > 0:
@@ -158,14 +158,14 @@ class _GlbDocument:
         self._lights.append(fields)
         return {"extensions": {PUNCTUAL: {"light": len(self._lights) - 1}}}
 
-    def _add_rectangle(self, name: str, light: RectangleLook) -> int:
-        x, y = light.size[0] / 2, light.size[1] / 2
-        corners = np.array([[-x, -y, 0], [-x, y, 0], [x, y, 0], [x, -y, 0]], np.float32)
+    def _add_area_light(self, name: str, light: AreaLook) -> int:
+        corners = local_triangles(light)
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         attributes = {
-            "POSITION": self._buffer.add_array(corners, has_bounds=True),
-            "NORMAL": self._buffer.add_array(np.tile(np.array([0, 0, -1], np.float32), (4, 1))),
+            "POSITION": self._buffer.add_array(corners.reshape(-1, 3), has_bounds=True),
+            "NORMAL": self._buffer.add_array(unit(np.repeat(normals, 3, axis=0), _UP)),
         }
-        indices = self._buffer.add_array(np.array([0, 1, 2, 0, 2, 3], np.uint32), INDICES)
+        indices = self._buffer.add_array(np.arange(3 * len(corners), dtype=np.uint32), INDICES)
         surface = emissive_surface(light.gain)
         material = ExportMaterial(name, surface, is_double_sided=False, error=0.0)
         self._materials.append(GltfMaterials(self._export.images, self._add_texture).document(material))

@@ -20,7 +20,7 @@ from relume.export.open_pbr_inputs import IMAGE_FOLDER, omitted_from_open_pbr
 from relume.export.usd_light_links import write_links
 from relume.export.usd_materials import UsdMaterials, omitted_from_preview
 from relume.image_io.write_image import write_image
-from relume.look.model import RectangleLook, SingleLightLook
+from relume.look.model import AreaLook, SingleLightLook
 from relume.raytrace.tangents import unit
 from relume.scene.model import Camera, Mesh
 from relume.scene.unique_names import append_number
@@ -164,13 +164,12 @@ class _StageWriter:
 
         path, strength = self._path("Lights", name), max(light.gain)
         color = tuple(channel / strength for channel in light.gain) if strength > 0 else (1.0, 1.0, 1.0)
-        if isinstance(light, RectangleLook):
-            prim = UsdLux.RectLight.Define(self._stage, path)
-            prim.CreateWidthAttr(light.size[0])
-            prim.CreateHeightAttr(light.size[1])
+        if isinstance(light, AreaLook):
+            prim = self._area_light(path, light)
         elif light.kind == "directional":
             prim = UsdLux.DistantLight.Define(self._stage, path)
-            prim.CreateAngleAttr(0.0)
+            prim.CreateAngleAttr(light.angle)
+            prim.CreateNormalizeAttr(True)
         else:
             prim = UsdLux.SphereLight.Define(self._stage, path)
             prim.CreateRadiusAttr(_POINT_RADIUS)
@@ -186,6 +185,25 @@ class _StageWriter:
         prim.CreateIntensityAttr(strength)
         prim.CreateColorAttr(color)
         _transform(prim, light_frame(light))
+        return prim
+
+    def _area_light(self, path: Any, light: AreaLook) -> Any:
+        from pxr import UsdLux
+
+        match light.kind:
+            case "rectangle":
+                prim = UsdLux.RectLight.Define(self._stage, path)
+                prim.CreateWidthAttr(light.size[0])
+                prim.CreateHeightAttr(light.size[1])
+                return prim
+            case "disc":
+                prim = UsdLux.DiskLight.Define(self._stage, path)
+            case "sphere":
+                prim = UsdLux.SphereLight.Define(self._stage, path)
+            case "tube":
+                prim = UsdLux.CylinderLight.Define(self._stage, path)
+                prim.CreateLengthAttr(light.length)
+        prim.CreateRadiusAttr(light.radius)
         return prim
 
     def _dome(self, mesh_paths: list[Any]) -> None:

@@ -9,7 +9,8 @@
                  w = M / N · w of light m with more lights than samples, N of them at random by pm
     surface      w = A cos θl / (N d²),  N uniform samples         emission W/m²/sr
 
-A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are stratified and shifted in their strata
+A surface is a rectangle, or triangles of a mesh or of a shape (`relume.lights.shape_triangles`), chosen by area. A
+directional light with an angle is a distant disk. The samples of a surface are stratified and shifted in their strata
 per receiver (`relume.lights.light_sampling`), so that the remaining noise is of pixel frequency.
 """
 
@@ -22,8 +23,9 @@ from typing import Any, NamedTuple
 import numba as nb
 import numpy as np
 from jaxtyping import Shaped
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from relume.lights.light_axes import light_axes, unit_direction
 from relume.lights.light_sampling import (
     EmitterParts,
     LightStrata,
@@ -32,6 +34,7 @@ from relume.lights.light_sampling import (
     split_axes,
     subdivide_emitter,
 )
+from relume.lights.shape_triangles import LightTriangles, shape_triangles
 from relume.look import LightGeometry
 from relume.math.plane_rounding import end_offsets
 
@@ -39,14 +42,15 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 POINT, DIRECTIONAL, SURFACE = 0, 1, 2
+_KINDS = {"point": POINT, "spot": POINT, "points": POINT, "directional": DIRECTIONAL}  # of lights without a surface
 _MIN_DISTANCE = np.float32(1e-12)  # meters, from point lights: so that the falloff is finite
 _INFINITE = np.float32(np.inf)
 _SEED = 1
-_AREA_FACTOR = 4  # of samples: most of a mesh face away from a point, or are far from it, like most of many lights
-_SAMPLE_FACTORS = {"rectangle": 1, "mesh": _AREA_FACTOR, "panels": _AREA_FACTOR, "points": _AREA_FACTOR}
+# most samples of a mesh, and of many lights, face away from a point, or are far from it; half of those of a sphere and
+# a tube face away
+_SAMPLE_FACTORS = {"rectangle": 1, "disc": 1, "sphere": 4, "tube": 4, "mesh": 4, "panels": 4, "points": 4}
 _PI = np.float32(math.pi)
 _MIN_CONE_COSINES = 1e-3  # difference of cosines, as in KHR_lights_punctual
-_PARALLEL_TOLERANCE = 1e-6
 
 
 class LocalLight(NamedTuple):
@@ -61,6 +65,7 @@ class LocalLight(NamedTuple):
         end_offset: of ray ends from the pieces, see `relume.math.plane_rounding.end_offsets`.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
         is_rectangle: a parallelogram, else triangles. is_two_sided: emits to both sides.
+        sample_factor: number of samples over that of a rectangle; 0 for a light without a surface.
     """
 
     kind: int
@@ -77,19 +82,7 @@ class LocalLight(NamedTuple):
     area: np.float32
     is_rectangle: bool
     is_two_sided: bool
-
-
-class LightTriangles(NamedTuple):
-    """Emissive triangles.
-
-    Attributes:
-        corners: corners of the triangles. relative_radiance: radiance of each over the mean of all.
-        is_two_sided: emits to both sides.
-    """
-
-    corners: Shaped[F32, "T 3 3"]
-    relative_radiance: Shaped[F32, " T"]
-    is_two_sided: bool
+    sample_factor: int
 
 
 class LightPoints(NamedTuple):
@@ -108,7 +101,13 @@ class LightPoints(NamedTuple):
 
 def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
     """Return the largest number of samples of a light, given that of a rectangle."""
-    return _SAMPLE_FACTORS.get(geometry.kind, 0) * num_rectangle_samples or 1
+    return _sample_factor(geometry) * num_rectangle_samples or 1
+
+
+def _sample_factor(geometry: LightGeometry) -> int:
+    if geometry.kind == "directional":
+        return int(geometry.angle > 0)
+    return _SAMPLE_FACTORS.get(geometry.kind, 0)
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
@@ -117,11 +116,11 @@ def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStr
     Args:
         num_rectangle_samples: samples of a rectangle, a power of four.
     """
-    num_samples, num_points = num_rectangle_samples * (1 if light.is_rectangle else _AREA_FACTOR), len(light.position)
-    if light.kind != SURFACE and num_points <= num_samples:
+    num_light_samples, num_points = light.sample_factor * num_rectangle_samples or 1, len(light.position)
+    if light.kind != SURFACE and num_points <= num_light_samples:
         zeros = np.zeros((num_points, 2), np.float32)
         return LightStrata(zeros, np.ones(2, np.float32), zeros, _SEED)
-    return make_strata(split_axes(max(len(light.power_cdf), len(light.intensity_cdf)), num_samples), _SEED)
+    return make_strata(split_axes(max(len(light.power_cdf), len(light.intensity_cdf)), num_light_samples), _SEED)
 
 
 def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
@@ -136,22 +135,24 @@ def prepare_local_lights(
     """Prepare a light of a look.
 
     Args:
-        geometry: geometry of the light.
-        triangles: triangles of a light of kind "mesh" or "panels"; without area it emits nothing.
+        geometry: the light.
+        triangles: of a light of kind "mesh" or "panels", which without area emits nothing; or of a sun disk, from
+            `sun_triangles`.
         points: the lights of kind "points".
     """
     is_rectangle = geometry.kind == "rectangle"
+    triangles = shape_triangles(geometry) if triangles is None else triangles
     corner, edges = _outline(geometry, triangles)
     piece_normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.linalg.norm(piece_normals, axis=1) * (1.0 if is_rectangle else 0.5)
     if triangles is not None:
         areas = areas * triangles.relative_radiance
     pieces, area = np.flatnonzero(areas > 0), areas.sum()
-    pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
+    if geometry.kind in ("mesh", "panels"):
+        pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
     piece_normals = piece_normals[pieces] / np.linalg.norm(piece_normals[pieces], axis=1, keepdims=True)
-    kind = {"point": POINT, "spot": POINT, "points": POINT, "directional": DIRECTIONAL}.get(geometry.kind, SURFACE)
     return LocalLight(
-        kind,
+        kind=SURFACE if len(pieces) else _KINDS.get(geometry.kind, SURFACE),
         **_point_fields(_single_point(geometry) if points is None else points),
         corner=corner[pieces].astype(np.float32),
         edges=edges[pieces].astype(np.float32),
@@ -161,6 +162,7 @@ def prepare_local_lights(
         area=np.float32(area),
         is_rectangle=is_rectangle,
         is_two_sided=triangles is not None and triangles.is_two_sided,
+        sample_factor=_sample_factor(geometry),
     )
 
 
@@ -179,7 +181,7 @@ def _point_fields(points: LightPoints) -> dict[str, F32]:
     intensity = np.cumsum(points.relative_intensity[order].astype(np.float64))
     return {
         "position": points.position[order],
-        "axis": np.array([_unit(direction) for direction in points.direction[order]], np.float32),
+        "axis": np.array([unit_direction(direction) for direction in points.direction[order]], np.float32),
         "cone_scale": scale.astype(np.float32),
         "cone_offset": offset.astype(np.float32),
         "intensity_cdf": (intensity / intensity[-1]).astype(np.float32),
@@ -204,19 +206,7 @@ def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple
 
 def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, " 3"], Shaped[F64, "2 3"]]:
     """Return a corner and the edges of a rectangle, whose cross product points to its emitting side; meters."""
-    facing = _unit(geometry.direction)
-    up_hint = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _PARALLEL_TOLERANCE else np.array([0.0, 0.0, 1.0])
-    up = up_hint - (up_hint @ facing) * facing
-    up /= np.linalg.norm(up)
-    horizontal = np.cross(up, facing)
-    angle = math.radians(geometry.rotation)
-    width, height = geometry.size
-    edges = np.stack(
-        [
-            width * (math.cos(angle) * horizontal + math.sin(angle) * up),
-            height * (math.cos(angle) * up - math.sin(angle) * horizontal),
-        ]
-    )
+    edges = np.array(geometry.size)[:, None] * light_axes(geometry.direction, geometry.rotation)[:2]
     return np.array(geometry.position, np.float64) - edges.sum(axis=0) / 2, edges
 
 
@@ -229,12 +219,6 @@ def panel_triangles(panels: Sequence[Mapping[str, Any]]) -> LightTriangles:
         corners += [(corner, corner + e, corner + e + f), (corner, corner + e + f, corner + f)]
     radiance = np.repeat([panel["emission"][0] for panel in panels], 2)
     return LightTriangles(np.array(corners, np.float32), radiance.astype(np.float32), is_two_sided=False)
-
-
-def _unit(direction: ArrayLike) -> F64:
-    vector = np.array(direction, np.float64)
-    vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not underflow
-    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _cones(cone: Shaped[F64, "M 2"]) -> tuple[F64, F64]:

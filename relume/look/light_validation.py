@@ -19,7 +19,7 @@ from relume.core.validation import (
 from relume.look.link_validation import check_link
 from relume.scene.light_members import MEMBER_KINDS
 from relume.scene.model import Light
-from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
+from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS, MAX_SUN_ANGLE, RADIUS_RANGE
 
 MAX_INTENSITY = 1e4
 MIN_DIRECTION = 1e-6  # smallest allowed longest component
@@ -31,6 +31,9 @@ LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; m
     "direction": (-MAX_METERS, MAX_METERS),
     "rotation": (-360.0, 360.0),
     "size": (1e-8, 1e8),
+    "radius": RADIUS_RANGE,
+    "length": RADIUS_RANGE,
+    "angle": (0.0, MAX_SUN_ANGLE),
     "cone": (0.0, 90.0),
 }
 
@@ -48,8 +51,11 @@ _DIRECTION = {"direction": [0.0, -1.0, 0.0]}
 _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
     "point": _POSITION,
     "spot": {**_POSITION, **_DIRECTION, "cone": [20.0, 30.0]},
-    "directional": _DIRECTION,
+    "directional": {**_DIRECTION, "angle": 0.0},
     "rectangle": {**_POSITION, **_DIRECTION, "rotation": 0.0, "size": [0.5, 0.5]},
+    "disc": {**_POSITION, **_DIRECTION, "radius": 0.25},
+    "sphere": {**_POSITION, "radius": 0.1},
+    "tube": {**_POSITION, "direction": [1.0, 0.0, 0.0], "radius": 0.02, "length": 1.0},
     "mesh": {"material": "", "image": None},
     **{kind: {"source": ""} for kind in MEMBER_KINDS},
 }
@@ -157,7 +163,7 @@ def _merge(pointer: Pointer, partial: Mapping[str, Any], base: Mapping[str, Any]
 
 def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, Any]) -> None:
     match field:
-        case "intensity" | "rotation":
+        case "intensity" | "rotation" | "radius" | "length" | "angle":
             check_number(pointer, value, *LIGHT_RANGES[field])
         case "color" | "emission" | "position":
             check_triple(pointer, value, *LIGHT_RANGES[field])

@@ -16,7 +16,7 @@ from relume.image_io.ocio.view import OcioView
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
-LightKind = Literal["point", "spot", "directional", "rectangle", "mesh", "points", "panels"]
+LightKind = Literal["point", "spot", "directional", "rectangle", "disc", "sphere", "tube", "mesh", "points", "panels"]
 ToneMap = Literal["agx", "filmic", "none"]
 PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
@@ -185,6 +185,9 @@ class LightGeometry(NamedTuple):
     cone: tuple[float, float] = (0.0, 90.0)
     rotation: float = 0.0
     size: tuple[float, float] = (0.0, 0.0)
+    radius: float = 0.0
+    length: float = 0.0
+    angle: float = 0.0
     material: str = ""
     image: str | None = None
     source: str = ""
@@ -254,10 +257,14 @@ class SpotLook(_LightLook):
 
 
 class DirectionalLook(_LightLook):
-    """Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m²."""
+    """Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m².
+
+    `angle`: diameter of the disk that it comes from, degrees; 0 for parallel light.
+    """
 
     kind: Literal["directional"]
     direction: Xyz
+    angle: float
 
 
 class RectangleLook(_LightLook):
@@ -272,6 +279,36 @@ class RectangleLook(_LightLook):
     direction: Xyz
     rotation: float
     size: tuple[float, float]
+
+
+class DiscLook(_LightLook):
+    """A disc that emits toward `direction`; emission is radiance. The camera does not see it. `radius`: meters."""
+
+    kind: Literal["disc"]
+    position: Xyz
+    direction: Xyz
+    radius: float
+
+
+class SphereLook(_LightLook):
+    """A sphere; emission is radiance. The camera does not see it. `radius`: meters."""
+
+    kind: Literal["sphere"]
+    position: Xyz
+    radius: float
+
+
+class TubeLook(_LightLook):
+    """A tube, whose side emits and whose ends do not; emission is radiance. The camera does not see it.
+
+    `position`: its middle. `direction`: its axis. `radius`, `length`: meters.
+    """
+
+    kind: Literal["tube"]
+    position: Xyz
+    direction: Xyz
+    radius: float
+    length: float
 
 
 class MeshLook(_LightLook):
@@ -300,7 +337,9 @@ class PanelsLook(_LightLook):
     source: str
 
 
-SingleLightLook = PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook
+AreaLook = RectangleLook | DiscLook | SphereLook | TubeLook
+"""Area lights other than emissive meshes."""
+SingleLightLook = PointLook | SpotLook | DirectionalLook | AreaLook | MeshLook
 LightLook = Annotated[SingleLightLook | PointsLook | PanelsLook, Field(discriminator="kind")]
 
 

@@ -20,6 +20,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.raytrace.texture import MipMap
 from relume.reference.links import lit_meshes, shadow_casters
+from relume.reference.shape_samples import sample_shape, sample_sun, strata
 from relume.scene.model import Scene, Texture
 
 F32 = NDArray[np.float32]
@@ -86,11 +87,16 @@ class ReferenceEmitter:
     def _sample_vectors(self, position: F64, num: int, rng: np.random.Generator) -> tuple[F64, F64]:
         """Vectors to points of the light (n, m, 3), and irradiance per unit of emission. (n, m, 1 or 3)"""
         light = self.look
+        if isinstance(light, DirectionalLook) and light.angle > 0:
+            direction, irradiance = sample_sun(light, len(position), num, rng)
+            return _DIRECTIONAL_DISTANCE * direction, np.full((*direction.shape[:2], 1), irradiance)
         if isinstance(light, DirectionalLook):
             to_light = np.broadcast_to(-_DIRECTIONAL_DISTANCE * _unit(light.direction), (len(position), 1, 3))
             return to_light, np.ones((len(position), 1, 1))
         if isinstance(light, RectangleLook):
             return self._surface_factor(position, *_sample_rectangle(light, len(position), num, rng))
+        if (samples := sample_shape(light, len(position), num, rng)) is not None:
+            return self._surface_factor(position, *samples)
         if isinstance(light, MeshLook):
             light_samples = _sample_triangles(self.triangles, self.uvs, len(position), num, rng)
             to_light, factor = self._surface_factor(position, *light_samples[:3])
@@ -183,12 +189,8 @@ def _sample_rectangle(
     up = np.cross(facing, across)
     width = np.cos(rotation) * across + np.sin(rotation) * up
     height = np.cos(rotation) * up - np.sin(rotation) * across
-    side = max(1, round(np.sqrt(num)))
-    stratum = np.arange(side * side)
-    u, v = (np.stack([stratum % side, stratum // side]) + rng.random((num_points, 2, side * side))).transpose(
-        1, 0, 2
-    ) / side
-    offset = light.size[0] * (u - 0.5)[..., None] * width + light.size[1] * (v - 0.5)[..., None] * height
+    u, v = strata(num_points, num, rng)
+    offset = light.size[0] * (u - 0.5) * width + light.size[1] * (v - 0.5) * height
     return np.array(light.position) + offset, facing, light.size[0] * light.size[1]
 
 

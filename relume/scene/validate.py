@@ -17,6 +17,8 @@ MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
 MAX_IOR = 4.0
 # of lights, in a scene and in a look: 1000 W are as bright in a scene of 100 km as 0.1 W in a room
 MAX_EMISSION, MAX_METERS = 1e12, 1e9
+MAX_SUN_ANGLE = 30.0  # diameter of the disk of a directional light, degrees
+RADIUS_RANGE = (1e-4, 1e4)  # of discs, spheres and tubes, and lengths of tubes; meters
 
 
 def check_mesh(mesh: Mesh, num_materials: int) -> None:

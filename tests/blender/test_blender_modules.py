@@ -58,6 +58,22 @@ def test_lights_come_back(name: str) -> None:
     assert light.type == "SUN" or np.allclose(back.to_world[:3, 3], light.to_world[:3, 3])
 
 
+@pytest.mark.parametrize(
+    ("shape", "power"),
+    [
+        ({"kind": "disc", "direction": [0.0, -1.0, 0.0], "radius": 0.5}, 8 * np.pi * np.pi * 0.25),
+        ({"kind": "sphere", "radius": 0.5}, 8 * np.pi * 4 * np.pi * 0.25),
+        ({"kind": "tube", "direction": [1.0, 0.0, 0.0], "radius": 0.1, "length": 2.0}, 8 * np.pi * 0.4 * np.pi),
+    ],
+)
+def test_shapes_that_blender_lacks_keep_their_power(shape: dict[str, Any], power: float) -> None:
+    common = {"intensity": 2.0, "color": [1.0, 0.5, 0.25], "emission": [4.0] * 3, "position": [1.0, 2.0, 3.0]}
+    light = from_look({**common, **shape})
+    assert light.power == pytest.approx(power)
+    assert light.type == ("AREA" if shape["kind"] == "disc" else "POINT")
+    assert light.color == (1.0, 0.5, 0.25)
+
+
 def test_strengths_are_radiometric() -> None:
     point, spot, sun, area = (to_look(LIGHTS[name]) for name in ("point", "spot", "sun", "area"))
     assert point["emission"] == pytest.approx([60 / (4 * np.pi)] * 3)

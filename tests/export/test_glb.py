@@ -143,7 +143,7 @@ def test_a_rectangle_is_an_emissive_quad_that_faces_its_direction(tmp_path: Path
     written(tmp_path / "a.glb", scene)
     again = import_scene(tmp_path / "a.glb", "again")
     panel = again.meshes[1]
-    assert panel.normals == pytest.approx(np.tile([0, -1, 0], (4, 1)), abs=1e-6)
+    assert panel.normals == pytest.approx(np.tile([0, -1, 0], (6, 1)), abs=1e-6)
     a, b, c = panel.positions[panel.faces[0]]
     assert np.cross(b - a, c - a)[1] < 0
     sides = sorted([np.linalg.norm(b - a), np.linalg.norm(c - b)])
@@ -151,7 +151,34 @@ def test_a_rectangle_is_an_emissive_quad_that_faces_its_direction(tmp_path: Path
     assert panel.positions.mean(axis=0) == pytest.approx([0, 2, 0], abs=1e-6)
     assert again.lights[0].fields["emission"] == pytest.approx([8, 4, 2])
     report = export_report(export_of(scene), FORMATS["glb"])
-    assert any("visible emissive rectangles" in sentence for sentence in report.omitted)
+    assert any("visible emissive meshes" in sentence for sentence in report.omitted)
+
+
+@pytest.mark.parametrize(
+    ("fields", "low", "high"),
+    [
+        ({"kind": "disc", "direction": [0.0, -1.0, 0.0], "radius": 0.5}, [-0.5, 2.0, -0.5], [0.5, 2.0, 0.5]),
+        ({"kind": "sphere", "radius": 0.5}, [-0.5, 1.5, -0.5], [0.5, 2.5, 0.5]),
+        (
+            {"kind": "tube", "direction": [0.0, 0.0, 2.0], "radius": 0.1, "length": 3.0},
+            [-0.1, 1.9, -1.5],
+            [0.1, 2.1, 1.5],
+        ),
+    ],
+)
+def test_shapes_are_emissive_meshes_of_their_size(
+    tmp_path: Path, fields: dict[str, Any], low: list[float], high: list[float]
+) -> None:
+    light = Light("Key", {"position": [0.0, 2.0, 0.0], "emission": [8.0, 4.0, 2.0], **fields})
+    scene = scene_of(Material("Wall", terms_of(PLASTIC)), lights=(light,))
+    written(tmp_path / "a.glb", scene)
+    report = export_report(export_of(scene), FORMATS["glb"])
+    assert any("visible emissive meshes" in sentence for sentence in report.omitted)
+    mesh = import_scene(tmp_path / "a.glb", "again").meshes[1]
+    np.testing.assert_allclose(mesh.positions.min(axis=0), low, atol=0.02)
+    np.testing.assert_allclose(mesh.positions.max(axis=0), high, atol=0.02)
+    a, b, c = mesh.positions[mesh.faces].transpose(1, 0, 2)
+    assert (np.cross(b - a, c - a) * mesh.normals[mesh.faces[:, 0]]).sum(axis=1).min() > 0
 
 
 def test_saved_looks_are_variants_of_the_materials_that_differ(tmp_path: Path) -> None:

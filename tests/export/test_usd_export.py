@@ -42,7 +42,15 @@ def test_geometry_cameras_and_lights_are_read_again(tmp_path: Path) -> None:
         "size": [2.0, 1.0],
         "emission": [3.0, 2.0, 1.0],
     }
-    again = exported(tmp_path / "a.usdz", scene, {"lights": {"Panel": panel}})
+    placed = {"position": [1.0, 2.0, 3.0], "emission": [3.0, 2.0, 1.0]}
+    shapes = {
+        "Panel": panel,
+        "Disc": {"kind": "disc", **placed, "direction": [0.6, -0.8, 0.0], "radius": 0.3},
+        "Ball": {"kind": "sphere", **placed, "radius": 0.3},
+        "Tube": {"kind": "tube", **placed, "direction": [0.0, 0.6, -0.8], "radius": 0.1, "length": 2.0},
+        "Soft": {"kind": "directional", "direction": [0.6, -0.8, 0.0], "angle": 5.0, "emission": [3.0, 2.0, 1.0]},
+    }
+    again = exported(tmp_path / "a.usdz", scene, {"lights": shapes})
     originals = {mesh.name: mesh for mesh in scene.meshes}
     assert originals.keys() == {mesh.name for mesh in again.meshes}
     for read in again.meshes:
@@ -55,7 +63,7 @@ def test_geometry_cameras_and_lights_are_read_again(tmp_path: Path) -> None:
     assert camera.to_world == pytest.approx(scene.cameras[0].to_world)
     assert (camera.yfov, camera.aspect) == pytest.approx((0.7, 1.5), rel=1e-5)
     lights = {light.name: light.fields for light in again.lights}
-    for light in (*scene.lights[1:], Light("Panel", panel)):
+    for light in (*scene.lights[1:], *(Light(name, shape) for name, shape in shapes.items())):
         for key, value in light.fields.items():
             got = lights[light.name][key]
             assert got == value if isinstance(value, str) else got == pytest.approx(value, abs=1e-4), (light.name, key)

@@ -19,6 +19,7 @@ _BRIGHTNESS: dict[str, SearchStrategy[Any]] = {
     "enabled": st.booleans(),
     "emission": COLORS,
 }
+_LENGTHS = st.floats(0.01, 10.0)
 _SIZES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=2)
 _CONES = st.lists(st.floats(1.0, 90.0), min_size=2, max_size=2).map(sorted)
 
@@ -31,7 +32,10 @@ _SPOTS = _light("spot", position=_COORDINATES, direction=_DIRECTIONS, cone=_CONE
 _LIGHTS = st.one_of(
     _light("point", position=_COORDINATES),
     _SPOTS,
-    _light("directional", direction=_DIRECTIONS),
+    _light("directional", direction=_DIRECTIONS, angle=st.floats(0.0, 30.0)),
+    _light("disc", position=_COORDINATES, direction=_DIRECTIONS, radius=_LENGTHS),
+    _light("sphere", position=_COORDINATES, radius=_LENGTHS),
+    _light("tube", position=_COORDINATES, direction=_DIRECTIONS, radius=_LENGTHS, length=_LENGTHS),
     _light("rectangle", position=_COORDINATES, direction=_DIRECTIONS, rotation=_DEGREES, size=_SIZES),
 )
 _TERMS = st.sampled_from(sorted(ANALYTIC)).flatmap(terms)

@@ -52,8 +52,12 @@ SUN = np.pi * np.sin(np.radians(0.53) / 2) ** 2
     ],
 )
 def test_distant_lights_have_their_irradiance(inputs: str, expected: float) -> None:
-    light = fields(lit("DistantLight", f"{inputs}\ncolor3f inputs:color = (1, .5, 0)"))
+    scene = lit("DistantLight", f"{inputs}\ncolor3f inputs:color = (1, .5, 0)")
+    light = fields(scene)
     assert light["kind"] == "directional"
+    angle = 0 if "angle = 0" in inputs else 30 if "angle = 180" in inputs else 0.53
+    assert light["angle"] == pytest.approx(angle)
+    assert any("is 30°, not 180°" in warning for warning in scene.warnings) == (angle == 30)
     np.testing.assert_allclose(light["direction"], [0, 0, -1], atol=1e-9)
     np.testing.assert_allclose(light["emission"], np.array([1, 0.5, 0]) * expected, rtol=1e-5)
 
@@ -99,15 +103,56 @@ def RectLight "Key"
     assert rotation == pytest.approx(-30)
 
 
-def test_spheres_and_cylinders_are_points_of_the_same_power() -> None:
+def test_spheres_and_cylinders_have_their_shape_and_radiance() -> None:
     sphere = fields(lit("SphereLight", "float inputs:intensity = 10\nfloat inputs:radius = .2", "metersPerUnit = 0.5"))
-    assert sphere["kind"] == "point"
+    assert sphere["kind"] == "sphere"
     np.testing.assert_allclose(sphere["position"], [0.5, 1, 1.5])
-    np.testing.assert_allclose(sphere["emission"], 10 * np.pi * 0.1**2, rtol=1e-5)
+    assert sphere["radius"] == pytest.approx(0.1)
+    np.testing.assert_allclose(sphere["emission"], 10, rtol=1e-5)
     power = "float inputs:intensity = 10\nbool inputs:normalize = 1"
-    np.testing.assert_allclose(fields(lit("SphereLight", power))["emission"], 2.5, rtol=1e-6)
-    cylinder = "float inputs:intensity = 4\nfloat inputs:length = 3\nfloat inputs:radius = .5"
-    np.testing.assert_allclose(fields(lit("CylinderLight", cylinder))["emission"], 4 * np.pi * 0.5 * 3 / 2, rtol=1e-6)
+    normalized = fields(lit("SphereLight", power, "metersPerUnit = 0.5"))
+    np.testing.assert_allclose(normalized["emission"], 10 / (4 * np.pi * 0.5**2), rtol=1e-6)
+    inputs = "float inputs:intensity = 4\nfloat inputs:length = 3\nfloat inputs:radius = .5"
+    tube = fields(lit("CylinderLight", inputs))
+    assert (tube["kind"], tube["radius"], tube["length"]) == ("tube", pytest.approx(0.5), pytest.approx(3))
+    np.testing.assert_allclose(tube["direction"], [1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(tube["emission"], 4, rtol=1e-6)
+
+
+def test_spheres_treated_as_points_are_points_of_the_same_power() -> None:
+    point = "float inputs:intensity = 10\nfloat inputs:radius = .2\nbool treatAsPoint = 1"
+    light = fields(lit("SphereLight", point))
+    assert light["kind"] == "point"
+    np.testing.assert_allclose(light["emission"], 10 * np.pi * 0.2**2, rtol=1e-5)
+    normalized = fields(
+        lit("SphereLight", "float inputs:intensity = 10\nfloat inputs:radius = 0\nbool inputs:normalize = 1")
+    )
+    assert normalized["kind"] == "point"
+    np.testing.assert_allclose(normalized["emission"], 2.5, rtol=1e-6)
+
+
+def test_tiny_spheres_keep_their_power() -> None:
+    light = fields(lit("SphereLight", "float inputs:intensity = 10\nfloat inputs:radius = 1e-5"))
+    assert light["radius"] == pytest.approx(1e-4)
+    np.testing.assert_allclose(light["emission"], 0.1, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("scale", "is_even"), [((2, 2, 7), True), ((1, 4, 1), False)])
+def test_disks_are_discs_of_their_area(scale: tuple[float, float, float], is_even: bool) -> None:
+    body = f"""
+def DiskLight "Key"
+{{
+    float inputs:intensity = 3
+    float inputs:radius = 0.5
+    float3 xformOp:scale = {scale}
+    uniform token[] xformOpOrder = ["xformOp:scale"]
+}}"""
+    scene = imported(usda(quad() + body))
+    light = scene.lights[0].fields
+    assert light["kind"] == "disc"
+    assert light["radius"] == pytest.approx(0.5 * 2)
+    np.testing.assert_allclose(light["emission"], 3, rtol=1e-6)
+    assert any("disc of the same area" in warning for warning in scene.warnings) != is_even
 
 
 def test_cones_make_spots() -> None:
@@ -119,15 +164,6 @@ def test_cones_make_spots() -> None:
     assert light["kind"] == "spot"
     np.testing.assert_allclose(light["cone"], [30, 40])
     np.testing.assert_allclose(light["emission"], 2 * np.pi * 0.25, rtol=1e-6)
-
-
-def test_disks_are_squares_of_the_same_area() -> None:
-    scene = lit("DiskLight", "float inputs:intensity = 2\nfloat inputs:radius = .5")
-    light = fields(scene)
-    assert light["kind"] == "rectangle"
-    np.testing.assert_allclose(light["size"], [np.sqrt(np.pi) / 2] * 2, rtol=1e-6)
-    np.testing.assert_allclose(light["emission"], 2)
-    assert "Light “Key” is shown as a square of the same area." in scene.warnings
 
 
 def test_color_temperatures_are_those_of_usd() -> None:

@@ -241,7 +241,7 @@ def library_opener(frame_s: float) -> Callable[[int, int], Library]:
 
     def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         return Library(
-            open_transfer, open_transfer, make_picture, refuse, refuse, refuse, refuse, refuse,
+            open_transfer, open_transfer, make_picture, refuse, refuse, refuse, refuse, refuse, refuse,
             lambda transfer: ({}, {}), dict, lambda: 0, lambda stores: None,
         )  # fmt: skip
 

@@ -18,7 +18,7 @@ from relume.core.color import luminance, srgb_encode
 from relume.live.fixed_camera.coverage import Coverage
 from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_environment
 from relume.live.fixed_camera.material_image import MaterialImage
-from relume.live.fixed_camera.mirror_samples import lit_rectangles
+from relume.live.fixed_camera.mirror_samples import lit_surfaces
 from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, Look
@@ -38,7 +38,7 @@ class _BackgroundState(NamedTuple):
 
     Attributes:
         factor: multiplies the map or the color, before the gain of the finished image.
-        mirror_emitters: rectangles that emit in front of the background in mirrors.
+        mirror_emitters: lights that emit in front of the background in mirrors.
     """
 
     background: BackgroundLook
@@ -78,7 +78,7 @@ class Background:
         background = look.background
         factor = tuple(1 / gain) if background.kind == "color" else light.environment_gain
         emitter_radiance = self._images.mirrors.mirror_emitters(light, self._images.transfer.local)
-        state = _BackgroundState(background, light.environment, factor, light.paths.direct, lit_rectangles(light))
+        state = _BackgroundState(background, light.environment, factor, light.paths.direct, lit_surfaces(light))
         for name, material in self._images.by_name.items():
             if material.num_samples and look.materials[name].shadow_catcher:
                 self._update_catcher(material, state, light)

@@ -1,4 +1,4 @@
-"""Mirrors in an image: the weights of samples that are visible in them, and rectangles that only mirrors show."""
+"""Mirrors in an image: the weights of samples that are visible in them, and lights that only mirrors show."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.specular_reflectance import specular_terms
 from relume.camera.ray_paths import NO_MIRROR
-from relume.lights.local_lights import rectangle
+from relume.lights.surface_hits import has_surface, surface_distance, surface_radiance
 from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.live.fixed_camera.protocols import LocalLightTransport
 from relume.views.mirror_samples import MirrorSamples
@@ -21,9 +21,9 @@ F32 = NDArray[np.float32]
 Documents = Sequence[Mapping[str, Any]]
 
 
-def lit_rectangles(light: Illumination) -> tuple[LightSource, ...]:
-    """Return the rectangles that emit direct light."""
-    return tuple(source for source in light.local if source.geometry.kind == "rectangle" and light.paths.direct)
+def lit_surfaces(light: Illumination) -> tuple[LightSource, ...]:
+    """Return the lights with a surface, other than meshes, that emit direct light."""
+    return tuple(source for source in light.local if has_surface(source.geometry) and light.paths.direct)
 
 
 class MirrorFactors:
@@ -43,11 +43,11 @@ class MirrorFactors:
         self.materials: list[int] = [] if chain is None else np.setdiff1d(chain.material, [NO_MIRROR]).tolist()
 
     def mirror_emitters(self, light: Illumination, local: LocalLightTransport) -> Shaped[F32, "3 m"] | None:
-        """Return the radiance of rectangles between mirrors and the samples visible in them; None if there are none.
+        """Return the radiance of lights between mirrors and the samples visible in them; None if there are none.
 
         The same array is returned while nothing changes. local: knows linked surfaces.
         """
-        sources = lit_rectangles(light)
+        sources = lit_surfaces(light)
         if self._mirror_samples is not None and sources != self._emitters[0]:
             self._emitters = sources, _emitter_radiance(self._mirror_samples, sources, local) if sources else None
         return self._emitters[1]
@@ -81,25 +81,12 @@ class MirrorFactors:
 
 
 def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSource], local: LocalLightTransport) -> F32:
-    """Radiance of rectangles on the ray paths from mirrors to mirrored samples. (3, m)"""
+    """Radiance of lights on the ray paths from mirrors to mirrored samples. (3, m)"""
     radiance = np.zeros((3, len(mirror_samples.sample)), np.float32)
     for geometry, gain in sources:
-        corner, edges = rectangle(geometry)
-        normal = np.cross(*edges)
-        cosine = -(mirror_samples.direction @ normal)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = -((corner - mirror_samples.origin) @ normal) / cosine
-            offset = mirror_samples.origin + distance[:, None] * mirror_samples.direction - corner
-            u, v = (offset @ edge / (edge @ edge) for edge in edges)
-        is_hit = (
-            (cosine > 0)
-            & (distance > 0)
-            & (distance < mirror_samples.distance)
-            & (u >= 0)
-            & (u <= 1)
-            & (v >= 0)
-            & (v <= 1)
-        )
+        distance = surface_distance(geometry, mirror_samples.origin, mirror_samples.direction)
+        emitted = surface_radiance(geometry) * np.array(gain, np.float32)
+        is_hit = distance < mirror_samples.distance
         is_hit &= local.is_lit_behind(geometry.link, mirror_samples.origin, mirror_samples.direction)
-        radiance[:, is_hit] += np.array(gain, np.float32)[:, None]
+        radiance[:, is_hit] += emitted[:, None]
     return radiance

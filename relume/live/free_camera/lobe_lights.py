@@ -263,9 +263,9 @@ def _add_small_light(tracer, points, wo, footprint, pattern, widths, emitter, ga
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _add_small_sample(
+def _add_small_sample(  # type: ignore[no-untyped-def]
     packet, irradiance, points, wo, footprint, pattern, widths, emitter, sample, gain, start, stop, out
-):  # type: ignore[no-untyped-def]
+):
     """Add one sample of a light without a surface. irradiance: scratch memory, a value for each lane"""
     for first in range(start, stop, LANES):
         width, num_lit = min(LANES, stop - first), 0

@@ -17,13 +17,13 @@ from relume.images.image_store import load_texture
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import (
     LightPoints,
-    LightTriangles,
     LocalLight,
     emitter_geometry,
     make_light_strata,
     panel_triangles,
     prepare_local_lights,
 )
+from relume.lights.shape_triangles import LightTriangles, sun_triangles
 from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.live.free_camera.lobe_lights import LobeEmitter, LobeLight
 from relume.live.opened.linked_surfaces import LinkedSurfaces
@@ -230,7 +230,9 @@ class LocalLights:
         if geometry.source:
             return self._build_members(geometry)
         if geometry.kind != "mesh":
-            return prepare_local_lights(geometry)
+            low, high = (end(self.positions, axis=0).astype(np.float64) for end in (np.min, np.max))
+            sun = sun_triangles(geometry, (low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+            return prepare_local_lights(geometry, sun)
         material, face_mask = self._emissive_faces(geometry.material)
         if geometry.image is not None:
             emitter = self._image_emitter(geometry.material, geometry.image)

@@ -21,7 +21,7 @@ from relume.assets.environments.read_environment import read_environment
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
-from relume.scene.validate import MAX_METERS
+from relume.scene.validate import MAX_METERS, MAX_SUN_ANGLE, RADIUS_RANGE
 from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
 from relume.scene_io.usd.light_links import read_links
 
@@ -112,7 +112,7 @@ class UsdLightReader:
         elif kind in ("RectLight", "DiskLight"):
             self._add_flat(prim, kind, fields, emitted, to_world, scale, label)
         else:
-            self._add_round(prim, kind, fields, emitted, scale, label)
+            self._add_round(prim, kind, fields, emitted, to_world, scale, label)
 
     def _number(self, prim: Any, name: str) -> float:
         value = prim.GetAttribute(f"inputs:{name}").Get(self._time)
@@ -133,8 +133,17 @@ class UsdLightReader:
                     f"{_capital(label)} is {_BLENDER_SUN:g} times as bright as in the file: {_BLENDER_REASON}."
                 )
             )
+        angle = float(np.degrees(2 * half_angle))
+        if angle > MAX_SUN_ANGLE:
+            self._warnings.append(
+                approximated(
+                    f"The angle of {label} is {MAX_SUN_ANGLE:g}°, not {angle:g}°; it is as bright as in the file."
+                )
+            )
         self._collector.add(
-            self._collector.name(prim.GetName()), {"kind": "directional", "direction": fields["direction"]}, emitted
+            self._collector.name(prim.GetName()),
+            {"kind": "directional", "direction": fields["direction"], "angle": min(angle, MAX_SUN_ANGLE)},
+            emitted,
         )
 
     def _is_from_blender(self, prim: Any) -> bool:
@@ -145,13 +154,15 @@ class UsdLightReader:
     def _add_flat(
         self, prim: Any, kind: str, fields: dict[str, Any], emitted: F64, to_world: F64, scale: F64, label: str
     ) -> None:
-        """A rectangle; a disk becomes a square of its area, or with a cone a spot."""
+        """A rectangle or a disc; a disk with a cone becomes a spot."""
         if kind == "RectLight":
             size = self._number(prim, "width") * scale[0], self._number(prim, "height") * scale[1]
             area = size[0] * size[1]
+            shape = {"kind": "rectangle", "rotation": _rotation(to_world, scale), "size": [float(s) for s in size]}
         else:
-            area = np.pi * self._number(prim, "radius") ** 2 * scale[0] * scale[1]
-            size = (np.sqrt(area), np.sqrt(area))
+            radius = self._number(prim, "radius") * float(np.sqrt(scale[0] * scale[1]))
+            area = np.pi * radius**2
+            shape = {"kind": "disc", "radius": _radius(radius)}
         if area <= 0:
             self._warnings.append(unsupported(f"Skipped {label}: it has no area."))
             return
@@ -162,17 +173,18 @@ class UsdLightReader:
             return
         if self._cone(prim) is not None:
             self._warnings.append(unsupported(f"The cone of {label} isn't supported; it emits to all of its front."))
-        if kind == "DiskLight":
-            self._warnings.append(approximated(f"{_capital(label)} is shown as a square of the same area."))
+        if kind == "DiskLight" and not np.isclose(scale[0], scale[1], rtol=1e-3):
+            self._warnings.append(approximated(f"{_capital(label)} is shown as a disc of the same area."))
         emitted = emitted * self._image_mean(prim, label)
-        self._collector.add(
-            self._collector.name(prim.GetName()),
-            {"kind": "rectangle", **fields, "rotation": _rotation(to_world, scale), "size": [float(s) for s in size]},
-            emitted,
-        )
+        self._collector.add(self._collector.name(prim.GetName()), {**fields, **shape}, emitted)
 
-    def _add_round(self, prim: Any, kind: str, fields: dict[str, Any], emitted: F64, scale: F64, label: str) -> None:
-        """A point with the mean intensity of a sphere, L π r², or of a cylinder, L π r l / 2."""
+    def _add_round(
+        self, prim: Any, kind: str, fields: dict[str, Any], emitted: F64, to_world: F64, scale: F64, label: str
+    ) -> None:
+        """A sphere or a tube; with a cone a spot, and a point if it is treated as one.
+
+        The mean intensity of a sphere is L π r², that of a cylinder L π r l / 2.
+        """
         radius, length = self._number(prim, "radius"), self._number(prim, "length") * scale[0]
         mean = float(np.cbrt(scale.prod()))
         if kind == "CylinderLight":
@@ -189,12 +201,18 @@ class UsdLightReader:
         if self._cone(prim) is not None:
             self._add_spot(prim, fields, intensity, label)
             return
-        if not prim.GetAttribute("treatAsPoint").Get(self._time):
-            shape = "Sphere" if kind == "SphereLight" else "Cylinder"
-            self._warnings.append(approximated(f"{shape} {label} is shown as a point of the same power."))
-        self._collector.add(
-            self._collector.name(prim.GetName()), {"kind": "point", "position": fields["position"]}, intensity
-        )
+        name, position = self._collector.name(prim.GetName()), {"position": fields["position"]}
+        if area <= 0 or prim.GetAttribute("treatAsPoint").Get(self._time):
+            self._collector.add(name, {"kind": "point", **position}, intensity)
+            return
+        if scale.max() > 1.001 * scale.min() and not (kind == "CylinderLight" and np.isclose(scale[1], scale[2], 1e-3)):
+            self._warnings.append(approximated(f"{_capital(label)} is shown round, without its uneven scale."))
+        shape: dict[str, Any] = {"kind": "sphere", "radius": _radius(radius)}
+        if kind == "CylinderLight":
+            axis = (to_world[:3, 0] / scale[0]).tolist()
+            shape = {"kind": "tube", "direction": axis, "radius": _radius(radius), "length": _radius(length)}
+        # of the power of the file also if its size is out of range
+        self._collector.add(name, {**position, **shape}, intensity / _section(shape))
 
     def _cone(self, prim: Any) -> list[float] | None:
         """Inner and outer half-angle of the cone of UsdLuxShapingAPI, degrees; None without one."""
@@ -276,6 +294,16 @@ def _rotate(pixels: Shaped[F32, "height width 3"], to_world: Shaped[F64, "3 3"])
     x, y, z = directions.T
     local = np.stack([z, y, -x], axis=1).astype(np.float32)
     return np.ascontiguousarray(lookup(pixels, local).reshape(height, width, 3), np.float32)
+
+
+def _radius(meters: float) -> float:
+    """A radius or a length in the range of a look."""
+    return float(np.clip(meters, *RADIUS_RANGE))
+
+
+def _section(shape: dict[str, Any]) -> float:
+    """Mean projected area of a sphere, π r², or of a tube, π r l / 2, m²."""
+    return float(np.pi * shape["radius"] * shape.get("length", 2 * shape["radius"]) / 2)
 
 
 def _capital(label: str) -> str:

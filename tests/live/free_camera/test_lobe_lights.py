@@ -7,7 +7,8 @@ from tiny_scenes import make_camera, quad
 
 from relume.brdf.lobe_sampling import lobe_of
 from relume.core.cache import Cache
-from relume.lights.local_lights import LightTriangles, make_light_strata, prepare_local_lights
+from relume.lights.local_lights import make_light_strata, prepare_local_lights
+from relume.lights.shape_triangles import LightTriangles
 from relume.live.free_camera import lobe_coverage
 from relume.live.free_camera.lobe_lights import LobeEmitter
 from relume.live.opened.openers import open_bake

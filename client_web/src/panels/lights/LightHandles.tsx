@@ -58,11 +58,14 @@ const STEPS: Record<string, [dx: number, dy: number]> = {
   ArrowDown: [0, STEP_PX],
 };
 
-/** Shapes of the handles: circle for point lights, cone for spots, square for panels, rays for directional lights, diamond for targets. */
+/** Shapes of the handles: circle for point lights, cone for spots, square for panels, ellipse for discs, large circle for spheres, bar for tubes, rays for directional lights, diamond for targets. */
 const SHAPES: Record<LightKind | "aim", string> = {
   point: "M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
   spot: "M-2 -6h4l4 11h-12z",
   rectangle: "M-5 -5h10v10h-10z",
+  disc: "M-6 0a6 4 0 1 0 12 0a6 4 0 1 0 -12 0z",
+  sphere: "M-6 0a6 6 0 1 0 12 0a6 6 0 1 0 -12 0z",
+  tube: "M-7 -2h14v4h-14z",
   directional:
     "M-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0 -7 0zM0 -5.5v-2.5M0 5.5v2.5M-5.5 0h-2.5M5.5 0h2.5M-4 -4l-1.7 -1.7M4 4l1.7 1.7M-4 4l-1.7 1.7M4 -4l1.7 -1.7",
   mesh: "",

@@ -32,12 +32,14 @@ interface NamedLight {
 
 function NumbersFields({ name, light, numbersField }: NamedLight & { numbersField: NumbersField }) {
   const { field, label, unit } = numbersField;
-  const values = (light as Partial<Record<NumbersField["field"], number[]>>)[field] ?? [];
+  const value = (light as Partial<Record<NumbersField["field"], number | number[]>>)[field] ?? [];
+  const values = Array.isArray(value) ? value : [value];
   const setValues = (next: number[]) => {
     if (field === "position") {
       const change = placeLight(light, next as Triple, aimLocked.value);
       if (change !== null) changeLight(numbersField.editLabel, name, change);
-    } else if (numbersField.allows?.(next) ?? true) editLight(numbersField.editLabel, name, field, next);
+    } else if (numbersField.allows?.(next) ?? true)
+      editLight(numbersField.editLabel, name, field, Array.isArray(value) ? next : next[0]);
   };
   return (
     <div class="numbers" role="group" aria-label={label} style={{ "--count": numbersField.names.length }}>

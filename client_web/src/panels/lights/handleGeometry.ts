@@ -3,6 +3,12 @@ import type { Light, Triple } from "../../protocol";
 import type { ProjectionCamera } from "./lightProjection";
 import { add, cross, dot, length, scale, subtract, roundComponents, normalize } from "./vector";
 
+/** Lights with a position and a target. */
+type AimedLight = Extract<Light, { kind: "spot" | "rectangle" | "disc" }>;
+
+const isAimed = (light: Light): light is AimedLight =>
+  light.kind === "spot" || light.kind === "rectangle" || light.kind === "disc";
+
 /** World positions of a light's handles: position and target; null if the light has none. */
 export interface Anchors {
   position: Triple;
@@ -22,9 +28,12 @@ function placementPivot(camera: ProjectionCamera): { middle: Triple; reach: numb
 export function anchorsOf(light: Light, camera: ProjectionCamera): Anchors | null {
   switch (light.kind) {
     case "point":
+    case "sphere":
+    case "tube":
       return { position: light.position, target: null };
     case "spot":
     case "rectangle":
+    case "disc":
       return { position: light.position, target: add(light.position, light.direction) };
     case "directional": {
       const { middle, reach } = placementPivot(camera);
@@ -48,7 +57,7 @@ export interface LightChange {
 export function placeLight(light: Light, to: Triple, aimLocked: boolean): LightChange | null {
   if (!("position" in light)) return null;
   const position = roundComponents(to);
-  if (light.kind === "point" || !aimLocked) return { position };
+  if (!isAimed(light) || !aimLocked) return { position };
   const direction = subtract(add(light.position, light.direction), position);
   return length(direction) < MIN_LENGTH ? null : { position, direction: roundComponents(direction) };
 }
@@ -62,7 +71,7 @@ export function moveLight(light: Light, to: Triple, camera: ProjectionCamera, ai
 
 /** Changes of a light aimed at a point. */
 export function aimLight(light: Light, target: Triple): LightChange | null {
-  if (light.kind !== "spot" && light.kind !== "rectangle") return null;
+  if (!isAimed(light)) return null;
   const direction = subtract(target, light.position);
   return length(direction) < MIN_LENGTH ? null : { direction: roundComponents(direction) };
 }
@@ -80,22 +89,44 @@ export function spotEdgePoint(direction: Triple, degrees: number): [width: Tripl
 const RING = 48;
 const WIDEST_DEGREES = 80;
 
-/** World-space outline of a light: a rectangle's edge, or a spot's cone at its target. */
+/** A circle about a point, closed. */
+function ring(middle: Triple, width: Triple, height: Triple, radius: number): Triple[] {
+  return Array.from({ length: RING + 1 }, (_, k) => {
+    const angle = (2 * Math.PI * k) / RING;
+    return add(middle, add(scale(width, radius * Math.cos(angle)), scale(height, radius * Math.sin(angle))));
+  });
+}
+
+/** World-space outline of a light: the edge of a rectangle or a disc, two circles of a sphere, the ends of a tube, or a
+ * spot's cone at its target. */
 export function lightOutline(light: Light): Triple[] {
-  if (light.kind === "rectangle") {
-    const [width, height] = spotEdgePoint(light.direction, light.rotation);
-    const corner = (x: number, y: number) =>
-      add(light.position, add(scale(width, (x * light.size[0]) / 2), scale(height, (y * light.size[1]) / 2)));
-    return [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+  switch (light.kind) {
+    case "rectangle": {
+      const [width, height] = spotEdgePoint(light.direction, light.rotation);
+      const corner = (x: number, y: number) =>
+        add(light.position, add(scale(width, (x * light.size[0]) / 2), scale(height, (y * light.size[1]) / 2)));
+      return [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+    }
+    case "disc":
+      return ring(light.position, ...spotEdgePoint(light.direction, 0), light.radius);
+    case "sphere":
+      return [
+        ...ring(light.position, [1, 0, 0], [0, 0, 1], light.radius),
+        ...ring(light.position, [1, 0, 0], [0, 1, 0], light.radius),
+      ];
+    case "tube": {
+      const [width, height] = spotEdgePoint(light.direction, 0);
+      const half = scale(normalize(light.direction), light.length / 2);
+      return [
+        ...ring(subtract(light.position, half), width, height, light.radius),
+        ...ring(add(light.position, half), width, height, light.radius),
+      ];
+    }
+    case "spot": {
+      const radius = length(light.direction) * Math.tan((Math.min(light.cone[1], WIDEST_DEGREES) * Math.PI) / 180);
+      return ring(add(light.position, light.direction), ...spotEdgePoint(light.direction, 0), radius);
+    }
+    default:
+      return [];
   }
-  if (light.kind === "spot") {
-    const [width, height] = spotEdgePoint(light.direction, 0);
-    const radius = length(light.direction) * Math.tan((Math.min(light.cone[1], WIDEST_DEGREES) * Math.PI) / 180);
-    const middle = add(light.position, light.direction);
-    return Array.from({ length: RING }, (_, k) => {
-      const angle = (2 * Math.PI * k) / RING;
-      return add(middle, add(scale(width, radius * Math.cos(angle)), scale(height, radius * Math.sin(angle))));
-    });
-  }
-  return [];
 }

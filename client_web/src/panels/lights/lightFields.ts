@@ -1,14 +1,16 @@
 /** Numeric and angle fields of a light in the inspector: label, range and changes. */
 import { RANGES } from "../../look.gen";
 import type { Light, Triple } from "../../protocol";
+import { directionFrom, sunPosition } from "./sunPosition";
 import { length } from "./vector";
 
 type Spot = Extract<Light, { kind: "spot" }>;
+type Sun = Extract<Light, { kind: "directional" }>;
 type Rectangle = Extract<Light, { kind: "rectangle" }>;
 
 /** A few numbers on one line. */
 export interface NumbersField {
-  field: "position" | "direction" | "size";
+  field: "position" | "direction" | "size" | "radius" | "length";
   editLabel: string;
   label: string;
   unit: string;
@@ -52,11 +54,34 @@ const NUMBERS: readonly NumbersField[] = [
     ...RANGES.light.size,
     step: 0.01,
   },
+  {
+    field: "radius",
+    editLabel: "Size",
+    label: "Radius",
+    unit: "m",
+    names: ["r"],
+    ...RANGES.light.radius,
+    step: 0.01,
+  },
+  {
+    field: "length",
+    editLabel: "Size",
+    label: "Length",
+    unit: "m",
+    names: ["l"],
+    ...RANGES.light.length,
+    step: 0.01,
+  },
 ];
+
+/** At 90° the azimuth would be lost. */
+const MAX_ELEVATION = 89.9;
 
 /** An angle in degrees, for the kinds of light that have its field. */
 export interface AngleField {
-  field: "rotation" | "cone";
+  field: "rotation" | "cone" | "angle" | "direction";
+  /** The only kind of light with it, if others have the field, too. */
+  kind?: Light["kind"];
   editLabel: string;
   label: string;
   minimum: number;
@@ -69,6 +94,34 @@ export interface AngleField {
 const cone = (light: Light) => (light as Spot).cone;
 
 const ANGLES: readonly AngleField[] = [
+  {
+    field: "direction",
+    kind: "directional",
+    editLabel: "Aim",
+    label: "Azimuth",
+    minimum: -180,
+    maximum: 180,
+    valueOf: (light) => sunPosition((light as Sun).direction).azimuth,
+    changeFor: (light, azimuth) => directionFrom({ ...sunPosition((light as Sun).direction), azimuth }),
+  },
+  {
+    field: "direction",
+    kind: "directional",
+    editLabel: "Aim",
+    label: "Elevation",
+    minimum: -MAX_ELEVATION,
+    maximum: MAX_ELEVATION,
+    valueOf: (light) => sunPosition((light as Sun).direction).elevation,
+    changeFor: (light, elevation) => directionFrom({ ...sunPosition((light as Sun).direction), elevation }),
+  },
+  {
+    field: "angle",
+    editLabel: "Angle",
+    label: "Angle",
+    ...RANGES.light.angle,
+    valueOf: (light) => (light as Sun).angle,
+    changeFor: (_, angle) => angle,
+  },
   {
     field: "rotation",
     editLabel: "Rotate",
@@ -98,4 +151,5 @@ const ANGLES: readonly AngleField[] = [
 ];
 
 export const numbersFieldsOf = (light: Light) => NUMBERS.filter(({ field }) => field in light);
-export const angleFieldsOf = (light: Light) => ANGLES.filter(({ field }) => field in light);
+export const angleFieldsOf = (light: Light) =>
+  ANGLES.filter(({ field, kind }) => field in light && (kind ?? light.kind) === light.kind);

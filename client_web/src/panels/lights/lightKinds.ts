@@ -18,7 +18,10 @@ export const LIGHT_KINDS: readonly LightKindLabels[] = [
   { kind: "point", label: "Point", help: "Emits evenly in all directions", click: "place the light" },
   { kind: "spot", label: "Spot", help: "Emits in a cone", click: "aim the spot" },
   { kind: "rectangle", label: "Panel", help: "Rectangular area light (one-sided)", click: "aim the panel" },
-  { kind: "directional", label: "Sun", help: "Parallel light from a distant source", click: "aim the sun" },
+  { kind: "disc", label: "Disc", help: "Round area light (one-sided)", click: "aim the disc" },
+  { kind: "sphere", label: "Sphere", help: "Ball that emits from all of its surface", click: "place the sphere" },
+  { kind: "tube", label: "Tube", help: "Fluorescent tube; its ends don't emit", click: "place the tube" },
+  { kind: "directional", label: "Sun", help: "Distant light; an angle softens its shadows", click: "aim the sun" },
 ];
 
 const SCENE_LABELS: Record<Exclude<LightKind, AddedKind>, string> = {
@@ -44,6 +47,9 @@ export const UNITS: Record<LightKind, string> = {
   spot: "W/sr",
   directional: "W/m²",
   rectangle: "W/sr/m²",
+  disc: "W/sr/m²",
+  sphere: "W/sr/m²",
+  tube: "W/sr/m²",
   mesh: "W/sr/m²",
   points: "W/sr",
   panels: "W/sr/m²",
@@ -62,6 +68,8 @@ export interface ClickedSurface {
 
 const OFFSET_FRACTION = 0.2;
 const SIDE_FRACTION = 0.4;
+const TUBE_LENGTH_FRACTION = 1;
+const TUBE_RADIUS_FRACTION = 0.02;
 /** Irradiance of a new light divided by the image's mean radiance: as bright as the image on a middle gray surface. */
 const BRIGHTNESS_FRACTION = 6;
 
@@ -96,6 +104,23 @@ export function createLight(kind: AddedKind, { position, normal, distance, radia
       const aim = roundComponents(subtract(position, raised));
       return { ...DEFAULT_LIGHTS.rectangle, emission, position: raised, direction: aim, size: [side, side] };
     }
+    case "disc":
+    case "sphere": {
+      const radius = Number(((SIDE_FRACTION / 2) * offset).toPrecision(2));
+      const emission = gray((irradiance * offset ** 2) / (Math.PI * radius ** 2));
+      const raised = liftAboveSurface(position, lightPosition, direction, radius);
+      const aim = roundComponents(subtract(position, raised));
+      return kind === "disc"
+        ? { ...DEFAULT_LIGHTS.disc, emission, position: raised, direction: aim, radius }
+        : { ...DEFAULT_LIGHTS.sphere, emission, position: raised, radius };
+    }
+    case "tube": {
+      const [tubeLength, radius] = [TUBE_LENGTH_FRACTION, TUBE_RADIUS_FRACTION].map((fraction) =>
+        Number((fraction * offset).toPrecision(2)),
+      ) as [number, number];
+      const emission = gray((irradiance * offset ** 2) / (2 * radius * tubeLength));
+      return { ...DEFAULT_LIGHTS.tube, emission, position: lightPosition, radius, length: tubeLength };
+    }
   }
 }
 
@@ -113,7 +138,7 @@ const COPY_OFFSET = 0.25;
 /** A copy of a light, offset so that the handles do not coincide. */
 export function offsetCopy(light: Light): Light {
   if (!("position" in light)) return { ...light };
-  const reach = "direction" in light ? length(light.direction) : 1;
+  const reach = "direction" in light && light.kind !== "tube" ? length(light.direction) : 1;
   return { ...light, position: roundComponents(add(light.position, [COPY_OFFSET * Math.max(reach, 0.1), 0, 0])) };
 }
 

@@ -41,6 +41,12 @@ function emittingExtent(light: Light): number {
     }
     case "rectangle":
       return Math.PI * light.size[0] * light.size[1];
+    case "disc":
+      return Math.PI ** 2 * light.radius ** 2;
+    case "sphere":
+      return 4 * Math.PI ** 2 * light.radius ** 2;
+    case "tube":
+      return 2 * Math.PI ** 2 * light.radius * light.length;
     default:
       return 1;
   }
