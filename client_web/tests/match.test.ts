@@ -6,13 +6,11 @@ import {
   endStroke,
   extendStroke,
   gesture,
-  isMatchOpen,
-  lockedPointers,
   matchStatus,
   resultText,
   strokeKind,
-  toggleLock,
 } from "../src/panels/lights/match/match";
+import { isMatchOpen, lockedPointers, toggleLock } from "../src/state/match";
 import type { SolveBody, SolveRequest } from "../src/protocol";
 import { bake } from "../src/state/bakes";
 import { look } from "../src/state/look";

@@ -10,7 +10,7 @@ import { acceptImageDrops } from "../panels/inspector/images/dropImages";
 import { acceptMaterialDrops } from "../panels/library/dropMaterial";
 import { LightHandles } from "../panels/lights/LightHandles";
 import { MatchBrush } from "../panels/lights/match/MatchBrush";
-import { isMatchOpen } from "../panels/lights/match/match";
+import { isMatchOpen } from "../state/match";
 import { requestPixelProbe } from "../session/pixelProbe";
 import { pickMaterial } from "../render/materialPicking";
 import { ImageCanvas } from "../render/canvas";

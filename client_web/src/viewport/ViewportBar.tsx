@@ -1,5 +1,6 @@
 /** Bar under the image: pixel probe on the left, view controls on the right. */
-import { isMatchOpen, toggleMatch } from "../panels/lights/match/match";
+import { toggleMatch } from "../panels/lights/match/match";
+import { isMatchOpen } from "../state/match";
 import { toDisplay } from "../render/color/tonemap";
 import { stage } from "../render/renderStage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";

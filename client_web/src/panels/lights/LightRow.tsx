@@ -5,14 +5,14 @@ import { beginDrag } from "../../session/prepare";
 import type { Light } from "../../protocol";
 import { soloLight, toggleLightSolo } from "../../state/visibility/soloSources";
 import { defaultLook } from "../../state/look";
+import { isMatchOpen } from "../../state/match";
 import { selectedLight, selectLight } from "../../state/selection";
 import { IconButton } from "../../ui/IconButton";
 import { Slider } from "../../ui/Slider";
 import { labelOf } from "./lightKinds";
 import { editLight, lightPath } from "./lightEdits";
 import { isLinked, linkText } from "./links";
-import { MatchLock } from "./match/MatchLock";
-import { isMatchOpen } from "./match/match";
+import { MatchLock } from "./MatchLock";
 
 /** Type of the dragged data: the name of a light. */
 export const DRAGGED_LIGHT = "application/x-relume-light";

@@ -93,5 +93,5 @@ export function removeLight(name: string): void {
   if (current === null || !groupOfLight.peek().has(name)) return editValue("Remove", lightPath(name), undefined);
   const remaining = Object.fromEntries(Object.entries(current.lights).filter(([key]) => key !== name));
   const groups = withoutLights(lightGroups.peek(), [name]);
-  replaceLook(`${name} · Remove`, { ...current, lights: remaining, light_groups: groups } as Look);
+  replaceLook(`${name} · Remove`, { ...current, lights: remaining, light_groups: groups });
 }

@@ -2,7 +2,6 @@
 import { batch, computed } from "@preact/signals";
 import { editValue, replaceLook } from "../../edit/edit";
 import { MAX_LIGHT_GROUPS, type LightGroupLook } from "../../look.gen";
-import type { Look } from "../../protocol";
 import { jsonPointer } from "../../state/document/pointer";
 import { look } from "../../state/look";
 import { groupSource, soloLight } from "../../state/visibility/soloSources";
@@ -78,7 +77,7 @@ function replaceGroups(label: string, groups: Groups): void {
   if (current === null) return;
   if (Object.keys(groups).length > MAX_LIGHT_GROUPS)
     return showNote(`Limit of ${MAX_LIGHT_GROUPS} light groups reached. Dissolve one first.`);
-  replaceLook(label, { ...current, light_groups: groups } as Look);
+  replaceLook(label, { ...current, light_groups: groups });
 }
 
 export function groupByPrefix(): void {

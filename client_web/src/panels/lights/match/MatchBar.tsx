@@ -1,16 +1,16 @@
 /** Bar of the match tool: kind of stroke, brush, reference picture, locks, and the result as text. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { fromHex, toHex } from "../../../render/color/colorMath";
+import { isMatchOpen } from "../../../state/match";
 import { RadioRow, type RadioOption } from "../../../ui/RadioRow";
 import { Slider } from "../../../ui/Slider";
 import { reportErrors } from "../../../ui/toasts";
-import { MatchLock } from "./MatchLock";
+import { MatchLock } from "../MatchLock";
 import {
   brushRadius,
   changesColor,
   ENVIRONMENT_POINTER,
   fitsExposure,
-  isMatchOpen,
   matchPicture,
   matchStatus,
   referencePicture,

@@ -9,21 +9,19 @@ import { LatestRequest } from "../../../session/net/latestRequest";
 import { bake } from "../../../state/bakes";
 import { changeByPatch } from "../../../state/document/jsonPatch";
 import { look } from "../../../state/look";
+import { isMatchOpen, lockedPointers } from "../../../state/match";
 import { activeViewName } from "../../../state/views";
 import { cameraOf } from "../../../viewport/cameras/freeCamera";
 
 export type StrokeKind = StrokeBody["kind"];
 export type ImagePoint = [x: number, y: number];
 
-export const isMatchOpen = signal(false);
 export const strokeKind = signal<StrokeKind>("brighter");
 export const strokeStops = signal(1);
 export const strokeColor = signal<Rgb>([1, 0.45, 0.2]);
 /** Radius of the brush on the screen, pixels. */
 export const brushRadius = signal(40);
 export const changesColor = signal(true);
-/** JSON pointers of the lights that stay. */
-export const lockedPointers = signal<ReadonlySet<string>>(new Set());
 /** A reference picture: its file in base64. */
 export const referencePicture = signal<{ name: string; image: string } | null>(null);
 /** True if only the relative brightness of the reference picture counts. */
@@ -230,12 +228,6 @@ export function toggleMatch(): void {
     stopGesture();
     isMatchOpen.value = !isMatchOpen.value;
   });
-}
-
-export function toggleLock(pointer: string): void {
-  const locked = new Set(lockedPointers.value);
-  if (!locked.delete(pointer)) locked.add(pointer);
-  lockedPointers.value = locked;
 }
 
 // the images of the lights are rendered when the tool opens, not with the first stroke
