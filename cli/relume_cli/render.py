@@ -78,24 +78,30 @@ def render(
     approximate: Annotated[
         bool, typer.Option("--approximate", help="Free camera: render the approximate image shown while it moves.")
     ] = False,
+    wait: Annotated[
+        bool, typer.Option(help="Render here; --no-wait queues the render for a running server, and prints its id.")
+    ] = True,
     dry_run: DryRun = False,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Render exact images, turntables, or animations of looks.
 
-    Prints the names of the written files.
+    Prints the names of the written files, or the id of a queued render.
     """
     from relume.output.file_names import FileFields
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.pictures.files import exr_options
     from relume_cli.pictures.looks import read_looks
     from relume_cli.pictures.plans import check_frames, check_keyframes, check_target, make_animation_plan, plan_files
+    from relume_cli.pictures.queue_render import check_queueable, queue_render
     from relume_cli.pictures.write_sheet import check_sheet, write_sheet
     from relume_server.persistence.look_store import LookStore
 
     animation_plan = make_animation_plan(turntable, rotate, frames, between, fps, step)
     check_target(output, animation_plan)
+    if not wait:
+        check_queueable(output, contact_sheet, resumes=resume)
     exr = exr_options(
         output,
         layers=layers,
@@ -118,10 +124,24 @@ def render(
         )
         fields = FileFields(source.scene.name, source.bake.id, source.view, "", start)
         planned_files = plan_files(named_looks, output, animation_plan, fields, views)
-        for planned_file in planned_files if animation_plan is not None else ():
+        for planned_file in planned_files if animation_plan is not None and wait else ():
             check_frames(planned_file, resumes=resume)
         check_sheet(contact_sheet, planned_files)
         documents = _check(source, planned_files, animation_plan)
+        if not (wait or dry_run):
+            job = queue_render(
+                service,
+                source,
+                named_looks,
+                views,
+                output,
+                animation_plan,
+                exr,
+                start=start,
+                approximate=approximate,
+            )
+            print_result(job, job["id"], as_json=as_json, details=_follow_lines(job))
+            return
         if not dry_run:
             _write(source, planned_files, animation_plan, exr, resumes=resume)
             write_sheet(contact_sheet, planned_files)
@@ -129,6 +149,13 @@ def render(
         service.close()
     for planned_file, document in zip(planned_files, documents, strict=True):
         print_result(document | {"dry_run": dry_run}, str(planned_file.path), as_json=as_json)
+
+
+def _follow_lines(job: dict[str, Any]) -> list[str]:
+    return [
+        f"queued for the server of this data directory; follow it: relume status {job['id']}",
+        f"when it is ready, all images are in {job['files']}",
+    ]
 
 
 def _check(
