@@ -123,6 +123,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     bodies.DryRunBody,
     renders.LooksBody,
     renders.RenderBody,
+    bodies.RenderPlanBody,
     bodies.ComparisonBody,
     bodies.ComparisonPlanBody,
     exports.ExportReportBody,

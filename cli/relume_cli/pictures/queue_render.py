@@ -62,7 +62,7 @@ def queue_render(
     queued = QueuedRender.model_validate({**fields, "start_frame": start, "quality": quality})
     check_views(queued)
     queued.file_names = name_images(queued, {source.bake.id: source.scene.name})
-    renders = RenderJobs(service.jobs, service.data_dir, lambda bake: source.scene.name, lambda *_: None)
+    renders = RenderJobs(service.jobs, service.data_dir, lambda bake: source.scene.name, service.get, lambda *_: None)
     identity = renders.submit(queued)
     return {
         "id": identity,

@@ -101,6 +101,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/shares": {"GET": VIEW, "POST": EDIT},
     "/api/looks/{name}/thumbnail": {"PUT": EDIT},
     "/api/looks/{name}/thumbnail.webp": {"GET": VIEW},
+    "/api/looks/{name}/view": {"PUT": EDIT, "DELETE": EDIT},
     "/api/shares/{share}": {"GET": VIEW, "DELETE": EDIT},
 }
 
