@@ -17,10 +17,8 @@ import { scene } from "../../state/scene";
 import { activeViewName } from "../../state/views";
 import { interpolateLooks } from "../../session/net/api";
 import { reportErrors, showError, showNote } from "../../ui/toasts";
-import { completeLook } from "./abCompare";
 import { encodePng } from "./displayImage";
 import { download, renderAndSave } from "./renderJob";
-import { savedLooks } from "./savedLooks";
 
 /** The server's limit of a file name's length. */
 const LONGEST_STEM = 120;
@@ -58,7 +56,7 @@ export function currentSize(): [number, number] | null {
 /** Render the visible look, or other looks with the same filters, on the server; `fetchFrom`: the result's file. */
 export async function startExport(
   exportName: string,
-  fetchFrom: string,
+  fetchFrom: readonly string[],
   more: Pick<RenderRequest, "format"> & Partial<RenderRequest>,
 ) {
   const [id, current] = [bake.value, look.value];
@@ -89,24 +87,11 @@ function exrKind({ layers, aovs }: ExrContents): string {
 /** Export an EXR. */
 export function exportExr(contents: ExrContents): Promise<void> {
   const pose = currentPose();
-  return startExport("EXR", "frames/0", {
+  return startExport("EXR", ["frames/0"], {
     format: "exr",
     ...contents,
     color_space: availableExrSpace.value,
     name: fileStem(exrKind(contents), availableExrSpace.value ?? ""),
-    path: pose === null ? null : { cameras: [pose] },
-  });
-}
-
-/** Export all saved looks of the scene in the active view, with their names, as one PNG. */
-export async function exportContactSheet(): Promise<void> {
-  const saved = savedLooks.peek();
-  if (saved.length === 0) return showNote("Save a look first: a contact sheet has all saved looks.");
-  const pose = currentPose();
-  return startExport("contact sheet", "contact-sheet.png", {
-    format: "contact_sheet",
-    looks: saved.map((each) => completeLook(each.look)) as unknown as NonNullable<RenderRequest["looks"]>,
-    look_names: saved.map(({ name }) => name),
     path: pose === null ? null : { cameras: [pose] },
   });
 }
@@ -140,5 +125,5 @@ async function noteCrossing(path: Turntable): Promise<void> {
 export function exportTurntable(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
   const path = { turntable: TURNTABLE_FRAMES, rotate: turntableRotation.value, start_camera: currentPose() };
   void noteCrossing(path).catch(showError);
-  return startExport("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, quality });
+  return startExport("turntable", [format === "mp4" ? "video.mp4" : "archive.zip"], { format, path, quality });
 }

@@ -25,6 +25,7 @@ import type {
   OcioView,
   Problem,
   RenderBody,
+  RenderPlanBody,
   RenderRequest,
   SceneBody,
   ShareBody,
@@ -231,6 +232,10 @@ export async function getZernikeFit(body: ZernikeFitRequest): Promise<ZernikeFit
 
 export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
+}
+/** Names, cost and warnings of a render; nothing is queued. */
+export async function planRender(body: RenderRequest): Promise<RenderPlanBody> {
+  return (await (await request("/api/renders", json("POST", { ...body, dry_run: true }))).json()) as RenderPlanBody;
 }
 /** The complete look of each frame of an animation. */
 export async function interpolateLooks(body: LooksRequest): Promise<LooksBody> {
