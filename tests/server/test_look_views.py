@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from relume.core.errors import ParameterError
 from relume.live.fixed_camera.protocols import CameraMode
 from relume_server.batch.frame_sequence import cameras_of
 from relume_server.batch.saved_views import use_saved_views
-from relume_server.persistence.look_store import LookStore, SavedLook
 from relume_server.schemas.renders import QueuedRender
 
 POSE = {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 50.0, "near": 0.0}
@@ -77,21 +77,12 @@ def test_sets_with_other_views_or_free_cameras_are_named(client: TestClient, bak
     assert "looks with a free camera ('Moved'); give looks with a fixed camera, or a bake of method probes" in text
 
 
-class Store:
-    """Saved looks of which one has a pose."""
-
-    def get(self, name: str) -> SavedLook:
-        view = f'{{"view": "left", "camera": {str(POSE).replace(chr(39), chr(34))}}}' if name == "Moved" else None
-        return SavedLook(name, "{}", "", 0.0, 0.0, view=view)
-
-
 def test_a_free_camera_stands_where_each_look_was_saved() -> None:
     views = {name: FakeView(name, 8, 6) for name in ("front", "left")}
     transfer: Any = FakeTransfer("s", views, camera_mode=CameraMode.FREE)
     request = QueuedRender(bake="b" * 16, view="front", saved_looks=["Moved", "Still"], format="png", saved_views=True)
     request.looks, request.look_names = [{}, {}], ["Moved", "Still"]
-    store: Any = Store()
-    use_saved_views(request, store, transfer)
+    use_saved_views(request, [json.dumps({"view": "left", "camera": POSE}), None], transfer)
     assert [request.image(k) for k in range(2)] == [("b" * 16, "left", 0), ("b" * 16, "front", 1)]
     moved, still = cameras_of(request, "front", transfer)
     assert moved is not None
@@ -105,6 +96,5 @@ def test_missing_views_are_an_error_without_a_default() -> None:
     transfer: Any = FakeTransfer("s", {"front": FakeView("front", 8, 6)})
     request = QueuedRender(bake="b" * 16, saved_looks=["Still"], format="png", saved_views=True)
     request.looks, request.look_names = [{}], ["Still"]
-    store: LookStore = Store()  # type: ignore[assignment]
     with pytest.raises(ParameterError, match="'Still'"):
-        use_saved_views(request, store, transfer)
+        use_saved_views(request, [None], transfer)

@@ -41,11 +41,12 @@ def queue_render(
     output: Path,
     animation_plan: AnimationPlan | None,
     exr: ExrOptions,
+    sets: QueuedRender | None,
     *,
     start: int,
     approximate: bool,
 ) -> dict[str, Any]:
-    """Queue a checked render as POST /api/renders does.
+    """Queue a checked render as POST /api/renders does; `sets`: the looks in their own views, if they are.
 
     Returns:
         The job as JSON.
@@ -61,6 +62,9 @@ def queue_render(
     quality = "interactive" if approximate else "exact"
     queued = QueuedRender.model_validate({**fields, "start_frame": start, "quality": quality})
     check_views(queued)
+    if sets is not None:
+        queued.view, queued.views = sets.view, []
+        queued.saved_views, queued.look_views, queued.path = True, sets.look_views, sets.path
     queued.file_names = name_images(queued, {source.bake.id: source.scene.name})
     renders = RenderJobs(service.jobs, service.data_dir, lambda bake: source.scene.name, service.get, lambda *_: None)
     identity = renders.submit(queued)

@@ -33,7 +33,7 @@ from relume_server.batch.frame_sequence import (
 )
 from relume_server.batch.image_names import label_images, name_images
 from relume_server.batch.rebakes import recipe_for_size, use_bakes
-from relume_server.batch.saved_views import use_saved_views
+from relume_server.batch.saved_views import read_saved_views, use_saved_views
 from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
@@ -95,7 +95,8 @@ async def _prepare(request: RenderRequest, services: Services) -> tuple[QueuedRe
     if queued.saved_views:
         await run_in_threadpool(require_ready_bake, services, queued.bake)
         async with services.transfers.acquire(queued.bake, services.bakes.store_path(queued.bake)) as transfer:
-            await run_in_threadpool(use_saved_views, queued, services.looks, transfer)
+            saved_views = await run_in_threadpool(read_saved_views, queued, services.looks)
+            use_saved_views(queued, saved_views, transfer)
     scene_names, warnings, max_bytes = dict[str, str](), dict[str, None](), 0
     for bake in dict.fromkeys(bake for bake, _ in queued.bake_views):
         await run_in_threadpool(require_ready_bake, services, bake)

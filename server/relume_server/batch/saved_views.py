@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from relume.core.errors import Description, ParameterError
 from relume.core.validation import names_text
 from relume.live.fixed_camera.protocols import CameraMode, OpenBake
@@ -10,18 +12,22 @@ from relume_server.schemas.cameras import CameraFrame, LookView
 from relume_server.schemas.renders import CameraPath, QueuedRender
 
 
-def use_saved_views(request: QueuedRender, store: LookStore, transfer: OpenBake) -> None:
+def read_saved_views(request: QueuedRender, store: LookStore) -> list[str | None]:
+    """Views saved with the looks of a batch, JSON; None for looks without one."""
+    num_own = len(request.looks) - len(request.saved_looks)
+    return [None] * num_own + [store.get(name).view for name in request.saved_looks]
+
+
+def use_saved_views(request: QueuedRender, saved_views: Sequence[str | None], transfer: OpenBake) -> None:
     """Set the view of each look: that saved with it, otherwise `view`; a free camera gets the saved poses, too.
 
     Args:
-        request: with names of all looks. store: of saved looks. transfer: the bake.
+        request: with names of all looks. saved_views: view of each look, JSON; None: none. transfer: the bake.
     Raises:
         ParameterError: looks have no view, one that is not in the bake, or a pose that fixed cameras do not have. All
             of these looks are named.
     """
-    num_own = len(request.looks) - len(request.saved_looks)
-    texts = [None] * num_own + [store.get(name).view for name in request.saved_looks]
-    views = [_view(text, request.view) for text in texts]
+    views = [_view(text, request.view) for text in saved_views]
     _check_views(request.look_names, views, transfer)
     request.look_views = [view.view for view in views if view is not None]
     if transfer.camera_mode is CameraMode.FREE:

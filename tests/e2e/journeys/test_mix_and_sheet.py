@@ -49,8 +49,14 @@ def test_light_mix_and_contact_sheet(editor: Editor, tmp_path: Path) -> None:
     name.press("Enter")
     expect(page.get_by_role("button", name="Rename Look").first).to_be_visible()
     page.get_by_role("button", name="More export formats").press("Enter")
+    page.get_by_role("button", name="Render…").press("Enter")
+    dialog = page.get_by_role("dialog", name="Render")
+    dialog.get_by_role("checkbox", name="Current look").check()
+    dialog.get_by_role("checkbox", name="Contact sheet").check()
+    expect(dialog.get_by_role("status", name="Result")).to_contain_text("2 images: ", timeout=WAIT_MS)
+    page.screenshot(path=tmp_path / "render.png")
     with page.expect_download(timeout=WAIT_MS) as download:
-        page.get_by_role("button", name="Contact sheet").press("Enter")
+        dialog.get_by_role("button", name="Render", exact=True).click()
     download.value.save_as(tmp_path / "sheet.png")
     with Image.open(tmp_path / "sheet.png") as sheet:
         sheet.load()
