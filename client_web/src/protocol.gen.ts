@@ -786,6 +786,12 @@ export interface MetalnessBody {
   terms: Record<string, unknown>[];
 }
 
+/** The complete look with the light mix, and a sentence for each thing that it does not have. */
+export interface MixedLookBody {
+  look: Record<string, unknown>;
+  warnings: string[];
+}
+
 /** A BRDF model; `texture` is its default texture channel, `needs_data` whether it is measured, `width_parameter` the parameter that roughness maps scale, `width_power` the power of roughness that it grows with, `specular_below` the value below which it is a mirror, and `data_prefix` the prefix of its data names (see `data`). */
 export interface ModelBody {
   model: string;

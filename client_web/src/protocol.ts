@@ -47,6 +47,7 @@ export type {
   Problem,
   ProblemMessage,
   RenderBody,
+  MixedLookBody,
   RenderPlanBody,
   RenderRequest,
   RoomMessage,

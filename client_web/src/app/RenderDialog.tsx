@@ -1,7 +1,7 @@
 /** Renders looks in views as one batch: names, size, format and cost before, progress meanwhile. */
 import { useEffect, useId, useRef, useState } from "preact/hooks";
 import {
-  batchFiles,
+  batchFile,
   batchRequest,
   choiceProblem,
   namesText,
@@ -175,7 +175,7 @@ export function RenderDialog({ onClose }: { onClose: () => void }) {
   const render = () => {
     if (!isReady) return;
     const light = choice.hasCurrent ? lightFilterText() : "";
-    void renderAndSave("Render", batchFiles(request, plan.total), request, light);
+    void renderAndSave("Render", batchFile(request, plan.total), request, light);
   };
   const [customWidth, customHeight] = choice.size ?? [width, height];
   const side = (label: string, value: number, set: (value: number) => readonly [number, number]) => (
@@ -247,6 +247,7 @@ export function RenderDialog({ onClose }: { onClose: () => void }) {
           {side("Height", customHeight, (value) => [customWidth, value])}
         </div>
       )}
+      <h3>Format</h3>
       <RadioRow label="Format" choices={FORMATS} selected={choice.format} onSelect={(format) => change({ format })} />
       <label>
         <input
@@ -279,6 +280,7 @@ export function RenderDialog({ onClose }: { onClose: () => void }) {
           />
         </label>
       )}
+      <h3>Priority</h3>
       <RadioRow
         label="Priority"
         choices={PRIORITIES}

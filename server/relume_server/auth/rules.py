@@ -80,6 +80,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/bakes/{bake}/events": {"GET": VIEW},
     "/api/bakes/{bake}/views/{view}/materials.png": {"GET": VIEW},
     "/api/bakes/{bake}/environment.png": {"GET": VIEW},
+    "/api/bakes/{bake}/light-mix": {"POST": VIEW},
     "/api/bakes/{bake}/probes": {"GET": VIEW},
     "/api/bakes/{bake}/probes/{array}": {"GET": VIEW},
     "/api/bakes/{bake}/session": {SOCKET: VIEW},

@@ -173,7 +173,8 @@ class RenderJobs(JobKind[QueuedRender]):
         frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
         video = str(self.video_path(job)) if job.request.format == "mp4" else None
         is_sheet = job.request.format == "contact_sheet"
-        sheet = {"path": str(self.sheet_path(job)), "labels": job.request.labels} if is_sheet else None
+        name = f"contact-sheet-{self.sheet_name(job)}"
+        sheet = {"path": str(self.sheet_path(job)), "name": name, "labels": job.request.labels} if is_sheet else None
         archive = str(self.archive_path(job))
         values = {"frames": frames, "archive": archive, "video": video, "fps": job.request.fps, "sheet": sheet}
         run.step("archive of a batch", values, num_bytes=folder_bytes(run.folder))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ def test_light_mix_and_contact_sheet(editor: Editor, tmp_path: Path) -> None:
     assert np.abs(editor.pixels() - dimmed).mean() > 0.5
     path.write_text(json.dumps({**mix, "lights": {"Kicker": {"intensity": 2}}}))
     drop(page, path)
-    expect(page.get_by_text("This look has no lights “Kicker”; the others are set.")).to_be_visible()
+    expect(page.get_by_text("lights that the scene does not have: 'Kicker'")).to_be_visible()
     assert np.abs(editor.pixels() - dimmed).max() <= 1
 
     page.get_by_role("button", name="Save look").click()
@@ -57,7 +58,11 @@ def test_light_mix_and_contact_sheet(editor: Editor, tmp_path: Path) -> None:
     page.screenshot(path=tmp_path / "render.png")
     with page.expect_download(timeout=WAIT_MS) as download:
         dialog.get_by_role("button", name="Render", exact=True).click()
-    download.value.save_as(tmp_path / "sheet.png")
-    with Image.open(tmp_path / "sheet.png") as sheet:
+    download.value.save_as(tmp_path / "all.zip")
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        names = archive.namelist()
+        archive.extract(names[2], tmp_path)
+    assert names[:2] == ["still-life_front_Current.png", "still-life_front_Look-1.png"]
+    with Image.open(tmp_path / names[2]) as sheet:
         sheet.load()
         assert min(sheet.size) > 100

@@ -78,8 +78,7 @@ export function namesText(names: readonly string[], total: number): string {
   return `${count}: ${shown.join(", ")}${more > 0 ? ` and ${more} more` : ""}`;
 }
 
-/** Files of a finished batch. */
-export function batchFiles({ format }: RenderRequest, total: number): string[] {
-  if (format === "contact_sheet") return ["contact-sheet.png", "archive.zip"];
-  return [total === 1 ? "frames/0" : "archive.zip"];
+/** The file of a finished batch: one image, or all with their contact sheet. */
+export function batchFile({ format }: RenderRequest, total: number): string {
+  return total === 1 && format !== "contact_sheet" ? "frames/0" : "archive.zip";
 }

@@ -56,7 +56,7 @@ export function currentSize(): [number, number] | null {
 /** Render the visible look, or other looks with the same filters, on the server; `fetchFrom`: the result's file. */
 export async function startExport(
   exportName: string,
-  fetchFrom: readonly string[],
+  fetchFrom: string,
   more: Pick<RenderRequest, "format"> & Partial<RenderRequest>,
 ) {
   const [id, current] = [bake.value, look.value];
@@ -87,7 +87,7 @@ function exrKind({ layers, aovs }: ExrContents): string {
 /** Export an EXR. */
 export function exportExr(contents: ExrContents): Promise<void> {
   const pose = currentPose();
-  return startExport("EXR", ["frames/0"], {
+  return startExport("EXR", "frames/0", {
     format: "exr",
     ...contents,
     color_space: availableExrSpace.value,
@@ -125,5 +125,5 @@ async function noteCrossing(path: Turntable): Promise<void> {
 export function exportTurntable(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
   const path = { turntable: TURNTABLE_FRAMES, rotate: turntableRotation.value, start_camera: currentPose() };
   void noteCrossing(path).catch(showError);
-  return startExport("turntable", [format === "mp4" ? "video.mp4" : "archive.zip"], { format, path, quality });
+  return startExport("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, quality });
 }

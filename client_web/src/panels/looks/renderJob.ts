@@ -11,11 +11,11 @@ import { serverUrl } from "../../session/net/serverUrl";
 const POLL_MS = 300;
 const KEY = "relume.rendering";
 
-/** `fetchFrom`: the files of the finished job. */
+/** `fetchFrom`: the file of the finished job. */
 interface ExportJob {
   id: string;
   exportName: string;
-  fetchFrom: readonly string[];
+  fetchFrom: string;
 }
 
 /** The running export: its progress, and a way to stop it once it has started. */
@@ -76,7 +76,7 @@ async function pollRendering(rendering: ExportJob): Promise<void> {
   if (state === null) return; // another job may have started since
   if (state.state === "failed") throw new Error(`${exportName} export failed: ${problemText(state.problem)}`);
   clearExport();
-  for (const file of fetchFrom) download(serverUrl(`/api/renders/${encodeURIComponent(id)}/${file}`), "");
+  download(serverUrl(`/api/renders/${encodeURIComponent(id)}/${fetchFrom}`), "");
 }
 
 /** Run `work` unless another export is running; report errors. */
@@ -95,7 +95,7 @@ async function runExport(exportName: string, work: () => Promise<void>): Promise
 /** Render and download a job, unless one is running; `light`: text of the active filters. */
 export async function renderAndSave(
   exportName: string,
-  fetchFrom: readonly string[],
+  fetchFrom: string,
   request: RenderRequest,
   light: string,
 ): Promise<void> {

@@ -12,7 +12,7 @@ export function exportAnimation(format: "png" | "mp4", quality: RenderQuality): 
   const camera = currentPose();
   const path = renderPath(currentPath.value, frames) ?? (camera === null ? null : { cameras: [camera] });
   const fetchFrom = format === "mp4" ? "video.mp4" : "archive.zip";
-  return startExport("animation", [fetchFrom], {
+  return startExport("animation", fetchFrom, {
     format,
     looks,
     durations: durations.value,

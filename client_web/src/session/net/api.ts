@@ -12,6 +12,7 @@ import type {
   ImageBody,
   ZernikeFitBody,
   ZernikeFitRequest,
+  Look,
   LooksBody,
   LooksRequest,
   MaterialBody,
@@ -21,6 +22,7 @@ import type {
   ImportedBody,
   MeasuredBody,
   MetalnessBody,
+  MixedLookBody,
   ModelBody,
   OcioView,
   Problem,
@@ -240,6 +242,11 @@ export async function planRender(body: RenderRequest): Promise<RenderPlanBody> {
 /** The complete look of each frame of an animation. */
 export async function interpolateLooks(body: LooksRequest): Promise<LooksBody> {
   return (await (await request("/api/renders/looks", json("POST", body))).json()) as LooksBody;
+}
+/** A look with the lights of a light mix. */
+export async function mixLook(bake: string, look: Look, mix: Record<string, unknown>): Promise<MixedLookBody> {
+  const path = `/api/bakes/${encodeURIComponent(bake)}/light-mix`;
+  return (await (await request(path, json("POST", { look, mix }))).json()) as MixedLookBody;
 }
 export async function deleteRender(id: string): Promise<void> {
   await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });
