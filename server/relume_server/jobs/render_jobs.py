@@ -150,7 +150,7 @@ class RenderJobs(JobKind[QueuedRender]):
         while (status := self._find_bake(bake)).state != "ready":
             if status.final:
                 reason = f": {status.problem}" if status.problem else ""
-                raise NotReadyError(f"the bake of these images {status.state}{reason}; resume the render")
+                raise NotReadyError(f"the bake of these images is {status.state}{reason}; resume the render")
             time.sleep(BAKE_POLL_S)
             run.record(done)
 
