@@ -54,8 +54,9 @@ def test_all_sets_are_rendered_each_in_its_view(client: TestClient, baked: Baked
     save(client, "Day", 0.3, {"view": "left"})
     save(client, "Night", 0.4, {"view": "front"})
     save(client, "Plain", 0.5, None)
-    request = {"bake": baked.bake, "view": "front", "looks": [], "saved_looks": ["Day", "Night", "Plain"]}
-    request |= {"format": "png", "saved_views": True, "file_name": "{view}_{look}.{frame:02}"}
+    request: dict[str, Any] = {"bake": baked.bake, "view": "front", "looks": []}
+    request |= {"saved_looks": ["Day", "Night", "Plain"], "saved_views": True}
+    request |= {"format": "png", "file_name": "{view}_{look}.{frame:02}"}
     images = archive(client, request)
     assert list(images) == ["left_Day.00.png", "front_Night.01.png", "front_Plain.02.png"]
     for image, radiance in zip(images.values(), (0.8, 0.9, 1.0), strict=True):
