@@ -15,7 +15,7 @@ beforeEach(() => {
 });
 
 test("the server applies a light mix to the current look, in one step", async () => {
-  const mixed = { ...LOOK, environment: { ...LOOK.environment, intensity: 2 } };
+  const mixed = { ...LOOK, environment: { ...LOOK.environment, intensity: 0.375 } };
   const sent: [string, unknown][] = [];
   vi.stubGlobal("fetch", (path: string, init: RequestInit) => {
     sent.push([path, JSON.parse(init.body as string)]);
