@@ -8,6 +8,7 @@ import { LOOK } from "./exampleLook";
 const MIX = { format: "relume light mix", version: 1, lights: { Key: { intensity: 0.3 } } };
 
 beforeEach(() => {
+  vi.stubGlobal("window", globalThis);
   history.clear();
   defaultLook.value = LOOK;
   look.value = LOOK;
