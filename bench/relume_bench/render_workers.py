@@ -61,7 +61,7 @@ def _batch_s(service: BakeService, bake: str, view: str, frames: int) -> float:
         ledger = JobLedger(service.ledger.sessions, Quota(99, 99), new_owner())
         jobs = JobService(ledger, {})
         jobs.use_steps(steps.run, steps.num_slots, str)
-        renders = RenderJobs(jobs, service.data_dir, lambda bake: "bench", lambda job, num_bytes: None)
+        renders = RenderJobs(jobs, service.data_dir, lambda bake: "bench", service.get, lambda job, num_bytes: None)
         with closing(jobs):
             jobs.start()
             _render_s(renders, bake, view, [350.0 + k for k in range(2 * steps.num_slots())])

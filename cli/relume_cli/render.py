@@ -36,6 +36,12 @@ def render(
     view: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="View; repeat for several. [default: the first]")
     ] = None,
+    saved_views: Annotated[
+        bool, typer.Option("--saved-views", help="Render each saved look in the view saved with it.")
+    ] = False,
+    all_sets: Annotated[
+        bool, typer.Option("--all-sets", help="Render all saved looks that have a view, each in its view.")
+    ] = False,
     layers: Annotated[bool, typer.Option("--layers", help="EXR: add one layer per light and per light path.")] = False,
     light_groups: Annotated[
         bool, typer.Option("--light-groups", help="EXR: add direct and indirect layers per light.")
@@ -78,24 +84,32 @@ def render(
     approximate: Annotated[
         bool, typer.Option("--approximate", help="Free camera: render the approximate image shown while it moves.")
     ] = False,
+    wait: Annotated[
+        bool, typer.Option(help="Render here; --no-wait queues the render for a running server, and prints its id.")
+    ] = True,
     dry_run: DryRun = False,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Render exact images, turntables, or animations of looks.
 
-    Prints the names of the written files.
+    Prints the names of the written files, or the id of a queued render.
     """
     from relume.output.file_names import FileFields
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.pictures.files import exr_options
-    from relume_cli.pictures.looks import read_looks
+    from relume_cli.pictures.looks import read_looks, read_sets
     from relume_cli.pictures.plans import check_frames, check_keyframes, check_target, make_animation_plan, plan_files
+    from relume_cli.pictures.queue_render import check_queueable, queue_render
+    from relume_cli.pictures.sets import check_sets, plan_sets, resolve_sets, select_sets
     from relume_cli.pictures.write_sheet import check_sheet, write_sheet
     from relume_server.persistence.look_store import LookStore
 
     animation_plan = make_animation_plan(turntable, rotate, frames, between, fps, step)
+    check_sets(look, view, animation_plan, saved_views=saved_views, all_sets=all_sets)
     check_target(output, animation_plan)
+    if not wait:
+        check_queueable(output, contact_sheet, resumes=resume)
     exr = exr_options(
         output,
         layers=layers,
@@ -106,7 +120,8 @@ def render(
     )
     service = open_bakes(open_settings(data))
     try:
-        named_looks = read_looks(look or (), LookStore(service.ledger.sessions))
+        look_store = LookStore(service.ledger.sessions)
+        named_looks = read_sets(look_store) if all_sets else read_looks(look or (), look_store)
         if animation_plan is not None:
             check_keyframes(len(named_looks), animation_plan)
         source, views = _open(
@@ -116,12 +131,33 @@ def render(
             is_free_camera=animation_plan is not None and animation_plan.subject in ("camera", "object"),
             approximate=approximate,
         )
+        if all_sets:
+            named_looks = select_sets(source, named_looks)
         fields = FileFields(source.scene.name, source.bake.id, source.view, "", start)
-        planned_files = plan_files(named_looks, output, animation_plan, fields, views)
-        for planned_file in planned_files if animation_plan is not None else ():
+        sets = resolve_sets(source, named_looks) if saved_views or all_sets else None
+        if sets is None:
+            planned_files = plan_files(named_looks, output, animation_plan, fields, views)
+        else:
+            planned_files = plan_sets(source, sets, output, fields)
+        for planned_file in planned_files if animation_plan is not None and wait else ():
             check_frames(planned_file, resumes=resume)
         check_sheet(contact_sheet, planned_files)
         documents = _check(source, planned_files, animation_plan)
+        if not (wait or dry_run):
+            job = queue_render(
+                service,
+                source,
+                named_looks,
+                views,
+                output,
+                animation_plan,
+                exr,
+                sets,
+                start=start,
+                approximate=approximate,
+            )
+            print_result(job, job["id"], as_json=as_json, details=_follow_lines(job))
+            return
         if not dry_run:
             _write(source, planned_files, animation_plan, exr, resumes=resume)
             write_sheet(contact_sheet, planned_files)
@@ -129,6 +165,13 @@ def render(
         service.close()
     for planned_file, document in zip(planned_files, documents, strict=True):
         print_result(document | {"dry_run": dry_run}, str(planned_file.path), as_json=as_json)
+
+
+def _follow_lines(job: dict[str, Any]) -> list[str]:
+    return [
+        f"queued for the server of this data directory; follow it: relume status {job['id']}",
+        f"when it is ready, all images are in {job['files']}",
+    ]
 
 
 def _check(
@@ -189,7 +232,7 @@ def _write(
                 write_animation(view_source, planned_file, animation_plan, exr, report_file)
             elif not (resumes and planned_file.path.exists()):
                 (look,) = complete_plan(planned_file, source.transfer.default_look)
-                write_picture(view_source, look, planned_file.path, exr, report_file)
+                write_picture(view_source, look, planned_file.path, exr, report_file, planned_file.camera)
 
 
 def _open(

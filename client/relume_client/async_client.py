@@ -7,6 +7,7 @@ import contextlib
 import os
 import sys
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -247,6 +248,18 @@ class AsyncBake(AsyncJob[BakeBody]):
         request = {"bake": self.id, "looks": [to_json(changes)]}
         body = await self._transport.json("POST", "/api/renders/looks", body=request)
         return Look(body["looks"][0])
+
+    async def with_light_mix(self, look: AnyLook, mix: Mapping[str, Any]) -> Look:
+        """A look with brightness and color of the lights of a light mix; what it does not have is a warning.
+
+        Args:
+            look: may be partial. mix: as in docs/formats.md.
+        """
+        request = {"look": to_json(look), "mix": to_json(mix)}
+        body = await self._transport.json("POST", f"/api/bakes/{self.id}/light-mix", body=request)
+        for warning in body["warnings"]:
+            warnings.warn(warning, stacklevel=2)
+        return Look(body["look"])
 
     async def share(self, look: AnyLook = {}, *, view: str | None = None) -> str:  # noqa: B006 - never changed
         """Create a share link of a look; returns its address, with that of the server.

@@ -358,7 +358,7 @@ class LookDocument(TypedDict):
 
 class LookEntry(TypedDict):
     """A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this
-    version's image, relative to the server, null if there is none."""
+    version's image, relative to the server, null if there is none. `view`: saved with the look, null if none was."""
 
     name: str
     etag: str
@@ -366,6 +366,14 @@ class LookEntry(TypedDict):
     modified: str
     bytes: int
     thumbnail: str | None
+    view: LookView | None
+
+
+class LookView(TypedDict):
+    """The view of a saved look: a view by name, and the pose of its free camera; null: as baked."""
+
+    view: str
+    camera: NotRequired[CameraFrame | None]
 
 
 class LooksBody(TypedDict):
@@ -597,6 +605,7 @@ class RenderBody(TypedDict):
     progress: float
     seconds_left: float | None
     problem: str | None
+    baking: float | None
 
 
 class RenderOptions(TypedDict):
@@ -610,6 +619,8 @@ class RenderOptions(TypedDict):
     saved_looks: NotRequired[Sequence[str]]
     views: NotRequired[Sequence[BakeView]]
     size: NotRequired[Sequence[int] | None]
+    saved_views: NotRequired[bool]
+    rebake: NotRequired[bool]
     name: NotRequired[str | None]
     file_name: NotRequired[str | None]
     start_frame: NotRequired[int]

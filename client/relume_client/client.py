@@ -9,7 +9,7 @@ import asyncio
 import os
 import threading
 import weakref
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Literal, Self, TypeVar, Unpack, overload
@@ -254,6 +254,10 @@ class Bake(_Job[BakeBody]):
     def look(self, changes: AnyLook | None = None) -> Look:
         """The scene's own look with changes, complete, to be edited without a session."""
         return self._thread.run(self._bake.look({} if changes is None else changes))
+
+    def with_light_mix(self, look: AnyLook, mix: Mapping[str, Any]) -> Look:
+        """A look with the lights of a light mix. See `AsyncBake.with_light_mix`."""
+        return self._thread.run(self._bake.with_light_mix(look, mix))
 
     def share(self, look: AnyLook | None = None, *, view: str | None = None) -> str:
         """Create a share link of a look; returns its address. See `AsyncBake.share`."""

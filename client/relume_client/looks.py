@@ -8,10 +8,9 @@ from __future__ import annotations
 import difflib
 import json
 import threading
-import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Final, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from relume_client.bodies import LookDocument, MaterialLook, TermLook
 Path = tuple[str | int, ...]
 Change = tuple[Path, Any]
 """A path in a look, and the JSON value that it has from now on."""
-LIGHT_MIX: Final = "relume light mix"
 _GROUPS = "materials", "lights"
 _SECTIONS = "environment", "background", "transport", "display"
 
@@ -211,13 +209,16 @@ class Look(LookPart):
         return Look(self._document)
 
     def update(self, changes: LookDocument | Mapping[str, Any] | Look) -> None:
-        """Set the given parts of a partial or complete look, or a light mix, as one edit.
+        """Set the given parts of a partial or complete look as one edit.
 
-        Lists and values are replaced whole. Lights of a light mix that the look does not have are a warning.
+        Lists and values are replaced whole.
+
+        Raises:
+            ValueError: it is a light mix, which `Bake.with_light_mix` makes a look of.
         """
         document = to_json(changes)
-        if document.get("format") == LIGHT_MIX:
-            document = _expand_light_mix(document, self._document["lights"])
+        if "format" in document:
+            raise ValueError("this is a light mix; give look.update(bake.with_light_mix(look, mix))")
         self._set(tuple(_differences(document, self._document, ())))
 
     def to_document(self) -> LookDocument:
@@ -251,26 +252,6 @@ class Look(LookPart):
         """Set the document without reporting it."""
         with self._lock:
             object.__setattr__(self, "_document", document)
-
-
-def _expand_light_mix(mix: Mapping[str, Any], lights: Mapping[str, Any]) -> dict[str, Any]:
-    """The partial look of a light mix; emission of lights of another kind has another unit, and is left out."""
-    if mix.get("version") != 1:
-        raise ValueError(f"the light mix has version {mix.get('version')!r}; update relume_client")
-    common = {name: dict(light) for name, light in mix.get("lights", {}).items() if name in lights}
-    kinds = mix.get("kinds", {})
-    differing = [name for name in common if kinds.get(name, lights[name]["kind"]) != lights[name]["kind"]]
-    for name in differing:
-        common[name].pop("emission", None)
-    if missing := [name for name in mix.get("lights", {}) if name not in lights]:
-        warnings.warn(f"the look has no lights {', '.join(map(repr, missing))}; the others are set", stacklevel=3)
-    if differing:
-        warnings.warn(f"lights of another kind keep their emission: {', '.join(map(repr, differing))}", stacklevel=3)
-    groups = {
-        name: {**group, "lights": [light for light in group["lights"] if light in lights]}
-        for name, group in mix.get("light_groups", {}).items()
-    }
-    return {"lights": common, "light_groups": groups, "environment": mix.get("environment", {})}
 
 
 def _differences(changes: Any, document: Any, path: Path) -> Iterator[Change]:

@@ -232,7 +232,7 @@ export interface RegionMessage {
   rect: [number, number, number, number] | null;
 }
 
-/** A batch of exact images; looks may be partial, and light mixes. `looks` are documents, `look_names` their names, and `saved_looks` names of saved looks, after them. `view` is the view of `bake`; `views`, instead, are several, also of other bakes: all looks are rendered in each. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. `file_name`: name of each image with fields, such as "{scene}_{view}_{look}.{frame:04}.exr"; fields are `scene`, `bake`, `view`, `look` and `frame`, a number with up to 9 digits. Frames, or looks without `frames` and `path`, are numbered from `start_frame`; of an animation only each `frame_step`-th is rendered, and has its number. `priority`: among renders of the same user, higher ones first. `webhook`: address that gets a signed message when the render has ended, see docs/operations.md. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission, and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second, "contact_sheet" one PNG of all images with their names. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
+/** A batch of exact images; looks may be partial, and light mixes. `looks` are documents, `look_names` their names, and `saved_looks` names of saved looks, after them. `view` is the view of `bake`; `views`, instead, are several, also of other bakes: all looks are rendered in each. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. `file_name`: name of each image with fields, such as "{scene}_{view}_{look}.{frame:04}.exr"; fields are `scene`, `bake`, `view`, `look` and `frame`, a number with up to 9 digits. Frames, or looks without `frames` and `path`, are numbered from `start_frame`; of an animation only each `frame_step`-th is rendered, and has its number. `saved_views`: render each saved look in the view saved with it, and the others in `view`. `rebake`: if a bake with fixed cameras has another size than `size`, bake its views with this size first. `dry_run`: check everything, queue nothing, and return names and cost. `priority`: among renders of the same user, higher ones first. `webhook`: address that gets a signed message when the render has ended, see docs/operations.md. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `aovs`: depth, position, normals, texture coordinates, albedo, emission, and Cryptomattes of objects and materials; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second, "contact_sheet" one PNG of all images with their names. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
 export interface RenderRequest {
   bake: string;
   looks?: Record<string, unknown>[];
@@ -246,6 +246,9 @@ export interface RenderRequest {
   views?: BakeView[];
   format: "exr" | "png" | "webp" | "mp4" | "contact_sheet";
   size?: [number, number] | null;
+  saved_views?: boolean;
+  rebake?: boolean;
+  dry_run?: boolean;
   name?: string | null;
   file_name?: string | null;
   start_frame?: number;
@@ -738,7 +741,7 @@ export interface LobeShapesBody {
   min_bits: number;
 }
 
-/** A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this version's image, relative to the server, null if there is none. */
+/** A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this version's image, relative to the server, null if there is none. `view`: saved with the look, null if none was. */
 export interface LookEntry {
   name: string;
   etag: string;
@@ -746,6 +749,13 @@ export interface LookEntry {
   modified: string;
   bytes: number;
   thumbnail: string | null;
+  view: LookView | null;
+}
+
+/** The view of a saved look: a view by name, and the pose of its free camera; null: as baked. */
+export interface LookView {
+  view: string;
+  camera: CameraFrame | null;
 }
 
 /** Complete look and camera of each frame; cameras are null without a `path`. `crosses`: material of the first surface that the camera's path crosses, null if there is none. */
@@ -804,6 +814,12 @@ export interface MeasuredBody {
 /** Terms that use the metallic map: textures of diffuse terms and highlights, and their mean f0. */
 export interface MetalnessBody {
   terms: Record<string, unknown>[];
+}
+
+/** The complete look with the light mix, and a sentence for each thing that it does not have. */
+export interface MixedLookBody {
+  look: Record<string, unknown>;
+  warnings: string[];
 }
 
 /** A BRDF model; `texture` is its default texture channel, `needs_data` whether it is measured, `width_parameter` the parameter that roughness maps scale, `width_power` the power of roughness that it grows with, `specular_below` the value below which it is a mirror, and `data_prefix` the prefix of its data names (see `data`). */
@@ -922,7 +938,7 @@ export interface RecurrenceBody {
   c: number[];
 }
 
-/** A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one. `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without login. `view`: null if there are several `views`. `warnings`: a sentence for each part of a light mix that a scene does not have. `created`, `started` and `ended` are times; null: not yet. */
+/** A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one. `baking`: progress 0…1 of a bake that it waits for; null: none. `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without login. `view`: null if there are several `views`. `warnings`: a sentence for each part of a light mix that a scene does not have. `created`, `started` and `ended` are times; null: not yet. */
 export interface RenderBody {
   id: string;
   name: string | null;
@@ -943,6 +959,16 @@ export interface RenderBody {
   progress: number;
   seconds_left: number | null;
   problem: string | null;
+  baking: number | null;
+}
+
+/** Response to a dry run: nothing was queued. `file_names`: of the first images, of `total`. `bytes`: upper bound of all files. `bakes`: bakes that the render starts and waits for, with their costs. */
+export interface RenderPlanBody {
+  file_names: string[];
+  total: number;
+  bytes: number;
+  warnings: string[];
+  bakes: DryRunBody[];
 }
 
 /** The room of a session. `id` opens it for editing, null for view-only participants; `view_token` opens it view-only. `participant_token` rejoins as the same participant, `self_id` is its id. `is_new`: the room was empty, so it has the look of this session. `default_look`: the scene's default look. */

@@ -14,7 +14,6 @@ import {
 } from "../src/panels/lights/lightGroups";
 import { removeLight, renameLight } from "../src/panels/lights/lightEdits";
 import { completeLook } from "../src/panels/looks/abCompare";
-import { withLightMix } from "../src/panels/looks/lookFiles";
 import { undo } from "../src/panels/looks/undoRedo";
 import type { Light, Look } from "../src/protocol";
 import { defaultLook, look } from "../src/state/look";
@@ -118,13 +117,11 @@ test("solo of a group shows its lights, even if it is muted", () => {
   expect(soloLight.value).toBeNull();
 });
 
-test("saved looks and light mixes bring their groups", () => {
+test("saved looks bring their groups", () => {
   const group = { lights: ["Key", "Gone"], intensity: 2 };
   expect(completeLook({ light_groups: { A: group } as unknown as Look["light_groups"] }).light_groups["A"]).toEqual({
     ...group,
     color: [1, 1, 1],
     enabled: true,
   });
-  const mix = { format: "relume light mix", version: 1, light_groups: { A: group } };
-  expect(withLightMix(BASE, mix).look.light_groups["A"]?.lights).toEqual(["Key"]);
 });

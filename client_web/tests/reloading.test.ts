@@ -35,7 +35,15 @@ beforeEach(() => {
 afterEach(() => vi.useRealTimers());
 
 const state = (stateName: string) => () =>
-  Response.json({ id: "a", bake: REQUEST.bake, state: stateName, progress: 0.5, seconds_left: 90, found: null });
+  Response.json({
+    id: "a",
+    bake: REQUEST.bake,
+    state: stateName,
+    progress: 0.5,
+    baking: null,
+    seconds_left: 90,
+    found: null,
+  });
 const away = () => {
   throw new TypeError("Failed to fetch");
 };
@@ -52,6 +60,18 @@ test("a second press before the server has answered begins no second export", as
   void renderAndSave("EXR", "frames/0", REQUEST, "");
   await vi.advanceTimersByTimeAsync(100);
   expect(posted).toEqual(["./api/renders"]);
+});
+
+test("a render that waits for a bake says so", async () => {
+  answer = () =>
+    Response.json({ id: "a", bake: "4k", state: "running", progress: 0, baking: 0.256, seconds_left: null });
+  const { exporting, exportText, renderAndSave } = await page();
+  void renderAndSave("Render", "archive.zip", REQUEST, "");
+  await vi.advanceTimersByTimeAsync(100);
+  expect(exporting.value && exportText(exporting.value)).toBe("Render: baking 25 %");
+  answer = state("ready");
+  await vi.advanceTimersByTimeAsync(1000);
+  expect(saved).toEqual(["./api/renders/a/archive.zip"]);
 });
 
 test("an export goes on after a reload, and while the server is away; its file is saved once", async () => {

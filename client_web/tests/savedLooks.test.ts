@@ -17,7 +17,7 @@ let requests: string[];
 
 beforeEach(() => {
   requests = [];
-  savedLooks.value = [{ name: "Old", etag: '"1"', created: "1", look: LOOK }];
+  savedLooks.value = [{ name: "Old", etag: '"1"', created: "1", view: null, look: LOOK }];
   vi.stubGlobal("fetch", (path: string, init: RequestInit) => {
     const headers = new Headers(init.headers);
     requests.push(`${init.method} ${path} ${headers.get("if-match") ?? `none ${headers.get("if-none-match")}`}`);
@@ -60,6 +60,26 @@ test("a look that is renamed, or comes back, stands where it stood", async () =>
   await exchangeSavedLook({ name: "New", look: LOOK, created: "1" }, null);
   await exchangeSavedLook(null, { name: "New", look: LOOK, created: "1" });
   expect(names()).toEqual(["New", "Later"]);
+});
+
+test("a view is saved with a look, goes along when it is renamed, and comes back with it", async () => {
+  const view = { view: "left", camera: null };
+  await exchangeSavedLook(null, { name: "New", look: LOOK, view });
+  expect(savedLooks.value[1]?.view).toEqual(view);
+  expect(requests).toEqual(["PUT ./api/looks/New none *", 'PUT ./api/looks/New/view "2"']);
+  requests = [];
+  await exchangeSavedLook({ name: "New", look: LOOK, view }, { name: "Newer", look: LOOK });
+  expect(savedLooks.value.map((saved) => [saved.name, saved.view])).toEqual([
+    ["Old", null],
+    ["Newer", view],
+  ]);
+  requests = [];
+  const newer = { name: "Newer", look: LOOK, view };
+  await exchangeSavedLook(newer, { ...newer, view: null });
+  expect(requests).toEqual(['PUT ./api/looks/Newer "2"', 'DELETE ./api/looks/Newer/view "2"']);
+  requests = [];
+  await exchangeSavedLook({ ...newer, view: null }, { ...newer, view: null });
+  expect(requests).toEqual(['PUT ./api/looks/Newer "2"']);
 });
 
 test("looks come in the order in which they were saved first, with their thumbnails, whatever was changed last", async () => {

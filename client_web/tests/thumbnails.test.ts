@@ -56,7 +56,7 @@ test("a look gives its picture to what it is the look of, once, and to everybody
       { name: "Bright", look: bright },
     ],
   } as never;
-  savedLooks.value = [{ name: "Bright", etag: '"b"', created: "1", look: bright }];
+  savedLooks.value = [{ name: "Bright", etag: '"b"', created: "1", view: null, look: bright }];
   attachThumbnail(bright, "data:bright");
   attachThumbnail(bright, "data:another");
   await vi.waitFor(() => expect(sent).toEqual(['PUT ./api/looks/Bright/thumbnail "b" {"picture":"data:bright"}']));

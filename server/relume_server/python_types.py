@@ -36,7 +36,7 @@ BODIES = "SceneBody", "BakeBody", "RenderBody", "LooksBody", "ModelBody", "Look"
 OPTIONS: Mapping[str, tuple[str, frozenset[str]]] = {
     "ImportOptions": ("Body_import_scene", frozenset({"scene", "companions", "environment"})),
     "BakeOptions": ("BakeRequest", frozenset({"scene", "method", "dry_run"})),
-    "RenderOptions": ("RenderRequest", frozenset({"bake", "looks", "view", "format"})),
+    "RenderOptions": ("RenderRequest", frozenset({"bake", "looks", "view", "format", "dry_run"})),
 }
 """Optional arguments of calls: the fields of a request, without those that the client fills in."""
 RENAMED = {"Look": "LookDocument"}  # the client has a class of this name

@@ -235,7 +235,7 @@ def _open_kinds(
         access.quotas.set_bytes("btf-job", work, 0)
 
     return _Kinds(
-        RenderJobs(jobs, settings.data, scene_name, partial(access.quotas.set_bytes, "render"), notify),
+        RenderJobs(jobs, settings.data, scene_name, service.get, partial(access.quotas.set_bytes, "render"), notify),
         ComparisonJobs(jobs, settings.data, partial(access.quotas.set_bytes, "comparison")),
         BtfJobs(jobs, settings.data, on_btf_ready, on_btf_failed),
     )

@@ -289,10 +289,89 @@ def test_dry_run_of_a_render_validates_and_writes_nothing(run: Any, tmp_path: Pa
     assert [path.name for path in tmp_path.iterdir()] == ["bad.json"]
 
 
+def test_a_render_that_is_not_waited_for_is_queued_and_followed(run: Any, baked: Path) -> None:
+    words = ["--look", "Blue", "--look", "Red night", "--output", "{look}.{frame:04}.exr", "--start", "7", "--aovs"]
+    code, text, said = run("render", "quad one", *words, "--no-wait")
+    job = text.strip()
+    assert code == 0
+    assert f"follow it: relume status {job}" in said
+    assert str(baked / "renders" / job / "archive.zip") in said
+    with closing(BakeService(baked)) as service, service.ledger.sessions() as session:
+        row = session.get(JobRow, job)
+    assert row is not None
+    request = json.loads(row.request)
+    assert (row.kind, row.state, request["aovs"]) == ("render", "queued", True)
+    assert request["looks"] == [BLUE, RED]
+    assert request["file_names"] == ["Blue.0007.exr", "Red-night.0008.exr"]
+    assert run("status", job)[1] == f"{job}  queued     0 of 2 frames  {{look}}.{{frame:04}}, exr\n"
+    (document,) = parsed(run("status", job, "--json")[1])
+    assert (document["id"], document["state"], document["done"], document["total"]) == (job, "queued", 0, 2)
+    assert run("cancel", job)[0] == 0
+
+
+@pytest.fixture
+def sets(baked: Path) -> Iterator[None]:
+    """Views of the saved looks: "Blue" has the first, "Red night" none."""
+    with closing(BakeService(baked)) as service:
+        looks = LookStore(service.ledger.sessions)
+        looks.put_view("Blue", '{"view": "Front", "camera": null}', "*")
+        looks.put("Kitchen", '{"materials": {"Tiles": {"terms": []}}}', None, None)
+        looks.put_view("Kitchen", '{"view": "Top", "camera": null}', "*")
+        yield
+        looks.put_view("Blue", None, "*")
+        looks.delete("Kitchen", "*")
+
+
+@pytest.mark.usefixtures("sets")
+def test_sets_are_rendered_each_in_its_view(run: Any, baked: Path, tmp_path: Path) -> None:
+    code, text, said = run("render", "quad one", "--all-sets", "--output", str(tmp_path / "{view}_{look}.png"))
+    assert "the set 'Kitchen' is not of this scene: Kitchen: /materials is 'Tiles'" in said
+    assert (code, text.splitlines()) == (0, [str(tmp_path / "Front_Blue.png")])
+    red, _, blue = mean_of(tmp_path / "Front_Blue.png")
+    assert blue > red
+    words = ["--look", "Red night", "--look", "Blue", "--saved-views", "--output", "{look}.png"]
+    job = run("render", "quad one", *words, "--no-wait")[1].strip()
+    with closing(BakeService(baked)) as service, service.ledger.sessions() as session:
+        row = session.get(JobRow, job)
+    assert row is not None
+    request = json.loads(row.request)
+    assert (request["look_views"], request["file_names"]) == (["Front", "Front"], ["Red-night.png", "Blue.png"])
+    assert run("cancel", job)[0] == 0
+
+
+def test_sets_need_a_view(run: Any) -> None:
+    assert "no saved look has a view" in run("render", "quad one", "--all-sets", "--output", "{look}.png")[2]
+
+
+def test_a_turntable_that_is_not_waited_for_has_its_frames(run: Any, baked: Path) -> None:
+    words = ["--turntable", "4", "--rotate", "environment", "--step", "2", "--output", "round"]
+    (job,) = parsed(run("render", "quad one", *words, "--no-wait", "--json")[1])
+    with closing(BakeService(baked)) as service, service.ledger.sessions() as session:
+        row = session.get(JobRow, job["id"])
+    assert row is not None
+    request = json.loads(row.request)
+    assert (job["total"], request["format"]) == (2, "png")
+    assert (request["path"]["turntable"], request["path"]["rotate"]) == (4, "environment")
+    assert request["file_names"] == ["round.0000.png", "round.0002.png"]
+    assert run("cancel", job["id"])[0] == 0
+
+
+def test_a_dry_run_without_waiting_queues_nothing(run: Any) -> None:
+    num_renders = len(run("list", "renders")[1].splitlines())
+    assert run("render", "quad one", "--output", "x.png", "--no-wait", "--dry-run")[0] == 0
+    assert len(run("list", "renders")[1].splitlines()) == num_renders
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["--look", "Blue", "--look", "Red night", "--output", "x.png"], "{look}"),
+        (["--all-sets", "--look", "Blue", "--output", "x.png"], "--all-sets is True; give it without --look"),
+        (["--saved-views", "--turntable", "2", "--output", "round"], "it without --turntable and --frames"),
+        (["--output", "/tmp/x.png", "--no-wait"], "--output is '/tmp/x.png'; give a file name without folders"),
+        (["--output", "a b.png", "--no-wait"], "--output is 'a b'; give letters, digits"),
+        (["--output", "x.png", "--resume", "--no-wait"], "--resume is True; give it without --no-wait"),
+        (["--output", "x.png", "--contact-sheet", "y.png", "--no-wait"], "give it without --no-wait"),
         (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "images 0 and 1 would both be 'Blue.png'"),
         (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "look with --turntable"),
         (["--look", "Green", "--output", "x.png"], "folder or saved look; choose from 'Blue', 'Red night'"),

@@ -11,14 +11,13 @@ import pytest
 from PIL import Image
 from test_client_calls import displayed, sigma_look
 
-from relume_client import Bake, Client, Look, ProblemError, ServerVersionError
+from relume_client import Bake, Client, ProblemError, ServerVersionError
 from relume_client.transport import file_name
 
 LIGHT = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "emission": [1.0, 1.0, 1.0]}
-LOOK: dict[str, Any] = {
-    "materials": {"Paper": {"terms": []}},
-    "lights": {"Key": {"kind": "point", **LIGHT}, "Sun": {"kind": "directional", **LIGHT}},
-    "environment": {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0, "map": None},
+LIGHTS: dict[str, Any] = {
+    "Key": {"kind": "point", "position": [1.0, 2.0, 3.0], **LIGHT},
+    "Sun": {"kind": "directional", "direction": [0.0, -1.0, 0.0], **LIGHT},
 }
 MIX: dict[str, Any] = {
     "format": "relume light mix",
@@ -60,22 +59,26 @@ def test_contact_sheet_is_one_file(bake: Bake, tmp_path: Path) -> None:
         assert image.size == (2 * (160 + 12) + 12, 96 + 24 + 2 * 12)
 
 
-def test_a_light_mix_sets_lights_by_name_and_leaves_materials_alone() -> None:
-    look = Look(LOOK)
+def test_a_light_mix_sets_lights_by_name_and_leaves_materials_alone(bake: Bake) -> None:
+    look = bake.look({**sigma_look(0.3), "lights": LIGHTS})
     with pytest.warns(UserWarning, match="light") as warned:
-        look.update(MIX)
+        mixed: Any = bake.with_light_mix(look, MIX).to_document()
     assert [str(warning.message) for warning in warned] == [
-        "the look has no lights 'Fill'; the others are set",
-        "lights of another kind keep their emission: 'Sun'",
+        "The light mix has values for lights that the scene does not have: 'Fill'.",
+        "These lights are of another kind in the scene and keep its emission: 'Sun'.",
     ]
     document: Any = look.to_document()
-    assert document["materials"] == LOOK["materials"]
-    assert document["lights"]["Key"] == {"kind": "point", **MIX["lights"]["Key"]}
-    assert document["lights"]["Sun"] == {**LOOK["lights"]["Sun"], "intensity": 0.5}
-    assert document["environment"] == MIX["environment"]
-    assert set(document) == set(LOOK)
-    with pytest.raises(ValueError, match="version 2"):
-        look.update({**MIX, "version": 2})
+    assert mixed["materials"] == document["materials"]
+    assert mixed["lights"]["Key"] == {**document["lights"]["Key"], **MIX["lights"]["Key"]}
+    assert mixed["lights"]["Sun"] == {**document["lights"]["Sun"], "intensity": 0.5}
+    assert list(mixed["lights"]) == ["Key", "Sun"]
+    assert mixed["environment"] == MIX["environment"]
+    with pytest.raises(ProblemError, match="version"):
+        bake.with_light_mix(look, {**MIX, "version": 2})
+    with pytest.raises(ProblemError, match="/mix/format"):
+        bake.with_light_mix(look, {"lights": {}})
+    with pytest.raises(ValueError, match="with_light_mix"):
+        look.update(MIX)
 
 
 @pytest.mark.parametrize("name", ["../x.png", "a/b.png", "..", "", "C:x.png", "a\\b.png", "%2e%2e%2fx", ".bashrc"])

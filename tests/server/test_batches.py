@@ -186,6 +186,9 @@ def test_contact_sheet_has_all_images_with_names(client: TestClient, request_of:
     assert sheet.shape == (2 * (96 + 24 + 12) + 12, 2 * (160 + 12) + 12, 3)
     np.testing.assert_array_equal(sheet[12 : 12 + 96, 12 : 12 + 160], displayed(0.6))
     np.testing.assert_array_equal(sheet[144 : 144 + 96, 12 : 12 + 160], displayed(0.8))
+    with zipfile.ZipFile(io.BytesIO(client.get(f"{body['url']}/archive.zip").content)) as files:
+        assert files.namelist()[3:] == ["contact-sheet-All-looks.png"]
+        assert files.read(files.namelist()[3]) == answer.content
     other = render(client, request_of)["url"]
     assert client.get(f"{other}/contact-sheet.png").status_code == 404
     assert "at most 400 images" in error_of(client, request_of | {"format": "contact_sheet", "looks": [{}] * 401})

@@ -67,16 +67,20 @@ def job_rows(data_folder: OpenFolder, table: JobTable) -> list[JobRow]:
 
 def list_jobs(data_folder: OpenFolder, noun: str) -> Iterator[tuple[dict[str, Any], str]]:
     """Jobs as in the database, as JSON and as lines; only the server knows the progress within a step."""
+    table = job_tables()[noun]
+    return (describe_job(row, table) for row in job_rows(data_folder, table))
+
+
+def describe_job(row: JobRow, table: JobTable) -> tuple[dict[str, Any], str]:
+    """A job as JSON and as a line."""
     from relume_cli.terminal.printing import iso_time
     from relume_worker.jobs.job import read_row
 
-    table = job_tables()[noun]
-    for row in job_rows(data_folder, table):
-        request, state, problem = read_row(row, table.placeholder)
-        total, fields = table.total(request), {name: getattr(request, name) for name in table.fields}
-        counts = {"state": state, "done": row.done, "total": total}
-        document = {"id": row.id, **fields, **counts, "problem": problem, "created": iso_time(row.created)}
-        yield document, f"{row.id}  {state:9}  {row.done} of {total} {table.unit}  {table.title(request)}"
+    request, state, problem = read_row(row, table.placeholder)
+    total, fields = table.total(request), {name: getattr(request, name) for name in table.fields}
+    counts = {"state": state, "done": row.done, "total": total}
+    document = {"id": row.id, **fields, **counts, "problem": problem, "created": iso_time(row.created)}
+    return document, f"{row.id}  {state:9}  {row.done} of {total} {table.unit}  {table.title(request)}"
 
 
 def find_job(data_folder: OpenFolder, noun: str, name: str) -> JobRow:

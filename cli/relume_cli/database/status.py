@@ -1,4 +1,4 @@
-"""`relume status`: progress of one bake, or of all running work."""
+"""`relume status`: progress of one bake or job, or of all running work."""
 
 from __future__ import annotations
 
@@ -19,18 +19,23 @@ if TYPE_CHECKING:
 def status(
     bake: Annotated[
         str | None,
-        typer.Argument(metavar="[BAKE]", help="Id of a bake, or a scene for its newest bake. [default: all]"),
+        typer.Argument(metavar="[ID]", help="Id of a bake or job, or a scene for its newest bake. [default: all]"),
     ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Show the progress of one bake, or of all running work."""
+    """Show the progress of one bake or job, or of all running work."""
     from relume_cli.database.actions import find_bakes, open_data_folder
+    from relume_cli.database.jobs import describe_job, find_any_job, job_tables
     from relume_cli.terminal.documents import bake_document
 
     with open_data_folder(data) as data_folder:
         if bake is None:
             _print_all(data_folder, as_json=as_json)
+            return
+        if (job := find_any_job(data_folder, bake)) is not None:
+            noun, row = job
+            print_result(*describe_job(row, job_tables()[noun]), as_json=as_json)
             return
         newest = find_bakes(data_folder.service, bake)[0]
         print_result(bake_document(newest, data_folder.service), _line(newest), as_json=as_json)

@@ -30,10 +30,11 @@ MAX_LOOKS = 1000
 
 
 class NamedLook(NamedTuple):
-    """A look document, perhaps partial, with its name."""
+    """A look document, perhaps partial, with its name. `view`: JSON of the view saved with it; None: none."""
 
     name: str
     document: dict[str, Any]
+    view: str | None = None
 
 
 def read_looks(arguments: Sequence[str], look_store: LookStore) -> list[NamedLook]:
@@ -50,6 +51,14 @@ def read_looks(arguments: Sequence[str], look_store: LookStore) -> list[NamedLoo
     if len(looks) > MAX_LOOKS:
         raise ParameterError("--look", Description(f"a list of {len(looks):,} looks"), f"at most {MAX_LOOKS:,} looks")
     return looks
+
+
+def read_sets(look_store: LookStore) -> list[NamedLook]:
+    """Read all saved looks that have a view, by name. Raises NotFoundError if there are none."""
+    names = sorted(look.name for look in look_store.list() if look.view is not None)
+    if not names:
+        raise NotFoundError("no saved look has a view; save one in the editor, or PUT /api/looks/NAME/view")
+    return [_by_name(name, look_store) for name in names]
 
 
 def _resolve_argument(argument: str, look_store: LookStore) -> list[NamedLook]:
@@ -90,7 +99,8 @@ def _by_name(argument: str, look_store: LookStore) -> NamedLook:
     names = [look.name for look in look_store.list()]
     name = match_name(argument, names)
     if name in names:
-        return _make_named_look(name, json.loads(look_store.get(name).document), name)
+        saved = look_store.get(name)
+        return NamedLook(name, json.loads(saved.document), saved.view)
     saved_names = ", ".join(repr(look_name) for look_name in names[:10])
     remedy = f"choose from {saved_names}" if names else "save a look first"
     raise NotFoundError(f"--look is {argument[:80]!r}, which is no file, folder or saved look; {remedy}")

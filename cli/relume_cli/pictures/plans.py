@@ -13,6 +13,7 @@ from relume_cli.pictures.files import FORMATS, check_display_view, check_output
 if TYPE_CHECKING:
     from relume.look import Look
     from relume.look.interpolate import InterpolationMode
+    from relume.scene.model import Camera
     from relume_cli.pictures.looks import NamedLook
 
 FRAME = "{frame"
@@ -54,6 +55,7 @@ class PlannedFile(NamedTuple):
     Attributes:
         look: name. documents: as given, perhaps partial; several are the keyframes of an animation.
         view: name. path: of the file, or of the video, folder or first frame. frames: of an animation, in order.
+        camera: of a free camera; None: that of the view.
     """
 
     look: str
@@ -61,6 +63,7 @@ class PlannedFile(NamedTuple):
     view: str
     path: Path
     frames: tuple[Path, ...] = ()
+    camera: Camera | None = None
 
 
 def make_animation_plan(

@@ -1,7 +1,6 @@
 /** Export: PNG and EXR with one click each; more EXR variants, turntables of free-camera views, and the scene. */
 import { useState } from "preact/hooks";
 import {
-  exportContactSheet,
   exportExr,
   exportPng,
   exportTurntable,
@@ -16,6 +15,7 @@ import { exrSpace, availableExrSpace, exrSpaces } from "../state/color";
 import { displayedFrames } from "../state/display";
 import { look } from "../state/look";
 import { hasFreeCamera, sideBySide, activeViewName } from "../state/views";
+import { RenderDialog } from "./RenderDialog";
 import { SceneExportDialog } from "./SceneExportDialog";
 
 /** The exported view, named when several views are shown. */
@@ -46,7 +46,6 @@ const IMAGE_EXPORTS: ExportOption[] = [
     run: () => exportExr({ aovs: true }),
   },
   { label: "EXR, beauty only", help: "Faster, smaller", run: () => exportExr({}) },
-  { label: "Contact sheet", help: "All saved looks in one PNG, with their names", run: exportContactSheet },
 ];
 
 const TURNTABLE_EXPORTS: ExportOption[] = [
@@ -114,7 +113,11 @@ function ColorSpaceSelect() {
 
 export function ExportMenu() {
   const [open, setOpen] = useState(false);
-  const [isExportingScene, setIsExportingScene] = useState(false);
+  const [openDialog, setOpenDialog] = useState<"render" | "scene" | null>(null);
+  const show = (dialog: "render" | "scene") => {
+    setOpen(false);
+    setOpenDialog(dialog);
+  };
   void displayedFrames.value;
   const isUnavailable = look.value === null || !stage.active.hasPixels;
   const busy = isUnavailable || exporting.value !== null;
@@ -168,13 +171,13 @@ export function ExportMenu() {
             ),
           )}
           <li>
-            <button
-              disabled={look.value === null}
-              onClick={() => {
-                setOpen(false);
-                setIsExportingScene(true);
-              }}
-            >
+            <button disabled={isUnavailable} onClick={() => show("render")}>
+              Render…
+            </button>
+            <span>Several looks and views, in any size; contact sheet</span>
+          </li>
+          <li>
+            <button disabled={look.value === null} onClick={() => show("scene")}>
               Scene…
             </button>
             <span>GLB, USD or MaterialX with this look; its light mix</span>
@@ -183,7 +186,8 @@ export function ExportMenu() {
           {exrSpaces.value.length > 0 && <ColorSpaceSelect />}
         </ul>
       )}
-      {isExportingScene && <SceneExportDialog onClose={() => setIsExportingScene(false)} />}
+      {openDialog === "render" && <RenderDialog onClose={() => setOpenDialog(null)} />}
+      {openDialog === "scene" && <SceneExportDialog onClose={() => setOpenDialog(null)} />}
     </div>
   );
 }

@@ -75,7 +75,7 @@ export function SceneExportDialog({ onClose }: { onClose: () => void }) {
   };
   return (
     <dialog
-      class="scene-export"
+      class="export-dialog"
       ref={dialog}
       aria-label="Export scene"
       onClose={onClose}

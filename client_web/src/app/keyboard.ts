@@ -1,6 +1,7 @@
 /** Keyboard shortcuts of the page; a focused control handles its own keys first. */
 import { useEffect } from "preact/hooks";
 import { cancelMatch } from "../panels/lights/match/match";
+import { showSavedAt } from "../panels/looks/showLook";
 import { stopPlacement } from "../panels/lights/placement";
 import { helpOpen } from "../state/panels";
 import { formatShortcut } from "../ui/chord";
@@ -37,6 +38,7 @@ function onKeyDown(event: KeyboardEvent): void {
   if (isTyping(event.target) && /z|y/.test(event.key)) return;
   event.preventDefault();
   if (event.key === "[" || event.key === "]") handleWipeKey(event.key);
+  else if (/^[1-9]$/.test(event.key)) showSavedAt(Number(event.key));
   else if (!(event.repeat && action.release !== undefined)) action.run();
 }
 

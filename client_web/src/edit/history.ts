@@ -1,7 +1,7 @@
 /** The undo history: steps between states; a drag is one step. Steps are plain data, so that they survive a reload. */
 import { signal } from "@preact/signals";
 import { changeToLook, joinChanges, type LookChange } from "../state/document/jsonPatch";
-import type { Look } from "../protocol";
+import type { Look, LookView } from "../protocol";
 
 export interface LookStep extends LookChange {
   kind: "look";
@@ -10,11 +10,12 @@ export interface LookStep extends LookChange {
   key?: string;
 }
 
-/** A saved look; `created`: time of its first save, by which saved looks are sorted. */
+/** A saved look; `created`: time of its first save, by which saved looks are sorted; `view`: the view saved with it. */
 export interface NamedLook {
   name: string;
   look: Partial<Look>;
   created?: string | undefined;
+  view?: LookView | null;
 }
 
 /** A keyframe of the timeline; `camera`: its pose on a camera path through the keyframes, angles in degrees; `duration`:

@@ -12,3 +12,6 @@ export const bake = signal<string | null>(null);
 export const method = signal<string | null>(null);
 export const axes = signal<HelloMessage["axes"]>([]);
 export const pendingBake = signal<BakeStatus | null>(null);
+
+/** The bake of a running render of this tab, which does not replace the shown one; null: none. */
+export const renderedBake = signal<string | null>(null);

@@ -84,7 +84,7 @@ export function ViewportBar() {
       <button title="Fit to window (F)" onClick={zoomFit}>
         Fit
       </button>
-      <button title="Actual size (1)" onClick={zoomActual}>
+      <button title="Actual size (0)" onClick={zoomActual}>
         1:1
       </button>
     </div>

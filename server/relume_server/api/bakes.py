@@ -45,17 +45,25 @@ def submit_bake(request: BakeRequest, services: ServicesDep, caller: CallerDep) 
     """Queue a bake, or with `dry_run` return its cost; the same recipe is the same bake."""
     recipe = _recipe(request, services)
     if request.dry_run:
-        plan = services.bakes.plan(request.scene, recipe)
-        dry = DryRunBody(id=bake_id(request.scene, recipe), recipe=_recipe_body(recipe), plan=_plan(plan, services))
-        return JSONResponse(dry.model_dump())
+        return JSONResponse(plan_bake(request.scene, recipe, services).model_dump())
+    body = bake_body(queue_bake(request.scene, recipe, caller, services), services)
+    return JSONResponse(body.model_dump(), 202, {"Location": f"/api/bakes/{body.id}"})
+
+
+def plan_bake(scene: str, recipe: Recipe, services: Services) -> DryRunBody:
+    """Plan a bake. Raises as `BakeService.plan`."""
+    plan = services.bakes.plan(scene, recipe)
+    return DryRunBody(id=bake_id(scene, recipe), recipe=_recipe_body(recipe), plan=_plan(plan, services))
+
+
+def queue_bake(scene: str, recipe: Recipe, caller: Caller, services: Services) -> BakeStatus:
+    """Queue a bake for a caller. Raises QuotaError, NearlyFullError, and as `BakeService.submit`."""
     with services.access.quotas.deciding:
-        _check_quotas(request.scene, recipe, caller, services)
-        identity = services.bakes.submit(request.scene, recipe, caller.name)
-        status = services.bakes.get(identity)
-        services.access.quotas.assign_owner(caller.name, "bake", identity, status.plan.planned_bytes)
+        _check_quotas(scene, recipe, caller, services)
+        status = services.bakes.get(services.bakes.submit(scene, recipe, caller.name))
+        services.access.quotas.assign_owner(caller.name, "bake", status.id, status.plan.planned_bytes)
     services.metrics.bakes.inc()
-    body = bake_body(status, services)
-    return JSONResponse(body.model_dump(), 202, {"Location": f"/api/bakes/{identity}"})
+    return status
 
 
 def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services) -> None:

@@ -16,6 +16,7 @@ from relume_server.io.comment_images import small_picture
 from relume_server.openapi import LOOK, files
 from relume_server.persistence.look_store import ListedLook, SavedLook, check_name, parse_document
 from relume_server.schemas.bodies import LookEntry, ThumbnailRequest, format_timestamp
+from relume_server.schemas.cameras import LookView
 from relume_server.services import ServicesDep
 
 router = APIRouter(prefix="/api/looks", tags=["looks"])
@@ -72,6 +73,22 @@ def put_thumbnail(name: str, request: ThumbnailRequest, services: ServicesDep, i
     return Response(status_code=204)
 
 
+@router.put("/{name}/view", status_code=204, name="put_look_view")
+def put_view(name: str, request: LookView, services: ServicesDep, if_match: Etags = None) -> Response:
+    """Store a view with the look in If-Match, so that choosing the look restores both; later versions keep it."""
+    if request.camera is not None:
+        request.camera.custom_camera(request.view)
+    services.looks.put_view(check_name(name), request.model_dump_json(), if_match)
+    return Response(status_code=204)
+
+
+@router.delete("/{name}/view", status_code=204, name="delete_look_view")
+def delete_view(name: str, services: ServicesDep, if_match: Etags = None) -> Response:
+    """Remove the view of the look in If-Match."""
+    services.looks.put_view(check_name(name), None, if_match)
+    return Response(status_code=204)
+
+
 @router.get(
     "/{name}/thumbnail.webp",
     response_class=Response,
@@ -102,6 +119,7 @@ def _entry(look: SavedLook | ListedLook) -> LookEntry:
         modified=format_timestamp(look.modified),
         bytes=look.num_bytes,
         thumbnail=address if look.has_thumbnail else None,
+        view=None if look.view is None else LookView.model_validate_json(look.view),
     )
 
 

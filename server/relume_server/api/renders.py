@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
@@ -17,7 +18,8 @@ from relume.live.fixed_camera.protocols import CameraMode, EditAxis, OpenBake
 from relume.look.light_mix import expand_light_mix
 from relume.output.exr.color_space import find_space
 from relume.output.exr.layers import make_layers
-from relume_server.api.bakes import require_ready_bake
+from relume.store.bake_protocol import Recipe
+from relume_server.api.bakes import plan_bake, queue_bake, require_ready_bake
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import PageDep
 from relume_server.auth.roles import Caller, CallerDep
@@ -30,11 +32,14 @@ from relume_server.batch.frame_sequence import (
     with_pivot,
 )
 from relume_server.batch.image_names import label_images, name_images
+from relume_server.batch.rebakes import recipe_for_size, use_bakes
+from relume_server.batch.saved_views import read_saved_views, use_saved_views
 from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
 from relume_server.openapi import files
 from relume_server.schemas.base import MAX_NAME, Id, Name
+from relume_server.schemas.bodies import RenderPlanBody
 from relume_server.schemas.cameras import CameraFrame
 from relume_server.schemas.protocol import MAX_CAMERA_PIXELS
 from relume_server.schemas.renders import (
@@ -50,24 +55,48 @@ from relume_server.schemas.renders import (
     RenderRequest,
 )
 from relume_server.services import Services, ServicesDep
-from relume_worker.job_state import JobState
+from relume_worker.job_state import ACTIVE_STATES, JobState
 from relume_worker.jobs.job import JobFilter, NotReadyError, new_id
 from relume_worker.scenes import get_scene
+from relume_worker.status import BakeStatus
 
+Rebakes = Mapping[str, tuple[str, Recipe]]
 router = APIRouter(prefix="/api/renders", tags=["renders"])
 FrameIndex = Annotated[int, Path(ge=0, lt=MAX_FRAMES)]
 MAX_WARNINGS = 20
+MAX_LISTED_NAMES = 100  # of a dry run
 MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "webp": "image/webp"}
 
 
 @router.post("", status_code=202)
 async def submit_render(
     request: RenderRequest, services: ServicesDep, caller: CallerDep, response: Response
-) -> RenderBody:
-    """Queue a batch; all looks are validated first."""
+) -> RenderBody | RenderPlanBody:
+    """Queue a batch, or with `dry_run` return names and cost; all looks are validated first."""
     services.webhooks.check(request.webhook)
+    queued, max_bytes = await _prepare(request, services)
+    rebakes = await run_in_threadpool(_rebakes, queued, services)
+    if request.dry_run:
+        response.status_code = 200
+        return await run_in_threadpool(_plan, queued, max_bytes, rebakes, services)
+    identity = await run_in_threadpool(_queue, queued, max_bytes, rebakes, caller, services)
+    response.headers["Location"] = f"/api/renders/{identity}"
+    return await run_in_threadpool(lambda: _body(services.renders.get(identity), services))
+
+
+async def _prepare(request: RenderRequest, services: Services) -> tuple[QueuedRender, int]:
+    """Validate a request, and name its images.
+
+    Returns:
+        The batch, and an upper bound of the size of its files, bytes.
+    """
     queued = await run_in_threadpool(resolve_looks, request, services.looks, services.settings.max_body_bytes)
     check_views(queued)
+    if queued.saved_views:
+        await run_in_threadpool(require_ready_bake, services, queued.bake)
+        async with services.transfers.acquire(queued.bake, services.bakes.store_path(queued.bake)) as transfer:
+            saved_views = await run_in_threadpool(read_saved_views, queued, services.looks)
+            use_saved_views(queued, saved_views, transfer)
     scene_names, warnings, max_bytes = dict[str, str](), dict[str, None](), 0
     for bake in dict.fromkeys(bake for bake, _ in queued.bake_views):
         await run_in_threadpool(require_ready_bake, services, bake)
@@ -79,12 +108,35 @@ async def submit_render(
             scene_names[bake] = scene.name
     queued.warnings = list(warnings)[:MAX_WARNINGS]
     if queued.name is None:
-        queued.name = f"{scene_names[queued.bake_views[0][0]]} {queued.view or ''}".strip()[:MAX_NAME]
+        view = "" if queued.saved_views else queued.view or ""
+        queued.name = f"{scene_names[queued.bake_views[0][0]]} {view}".strip()[:MAX_NAME]
     queued.file_names = name_images(queued, scene_names)
     queued.labels = label_images(queued) if queued.format == "contact_sheet" else []
-    identity = await run_in_threadpool(_queue, queued, max_bytes, caller, services)
-    response.headers["Location"] = f"/api/renders/{identity}"
-    return _body(await run_in_threadpool(services.renders.get, identity))
+    return queued, max_bytes
+
+
+def _rebakes(request: QueuedRender, services: Services) -> Rebakes:
+    """Scene and recipe of each bake that a batch needs with another size, by the id of the one that it names."""
+    statuses = [services.bakes.get(bake) for bake in dict.fromkeys(bake for bake, _ in request.bake_views)]
+    recipes = [(status, recipe_for_size(status, request)) for status in statuses]
+    return {status.id: (status.scene, recipe) for status, recipe in recipes if recipe is not None}
+
+
+def _plan(request: QueuedRender, max_bytes: int, rebakes: Rebakes, services: Services) -> RenderPlanBody:
+    plans = [plan_bake(scene, recipe, services) for scene, recipe in rebakes.values()]
+    return RenderPlanBody(
+        file_names=request.file_names[:MAX_LISTED_NAMES],
+        total=request.num_images,
+        bytes=max_bytes,
+        warnings=request.warnings,
+        bakes=[plan for plan in plans if not _is_ready(plan.id, services)],
+    )
+
+
+def _is_ready(bake: str, services: Services) -> bool:
+    with suppress(NotFoundError):
+        return services.bakes.get(bake).state == "ready"
+    return False
 
 
 def _light_mix_warnings(request: QueuedRender, transfer: OpenBake) -> list[str]:
@@ -92,8 +144,11 @@ def _light_mix_warnings(request: QueuedRender, transfer: OpenBake) -> list[str]:
     return [text for partial in request.looks for text in expand_light_mix(partial, transfer.default_look)[1]]
 
 
-def _queue(request: QueuedRender, max_bytes: int, caller: Caller, services: Services) -> str:
-    """Queue a batch that takes at most so many bytes. Raises QuotaError, NearlyFullError, BusyError."""
+def _queue(request: QueuedRender, max_bytes: int, rebakes: Rebakes, caller: Caller, services: Services) -> str:
+    """Queue a batch that takes at most so many bytes, and its bakes. Raises QuotaError, NearlyFullError, BusyError."""
+    for scene, recipe in rebakes.values():
+        queue_bake(scene, recipe, caller, services)
+    use_bakes(request, rebakes)
     identity = new_id()
     with services.access.quotas.planned(caller.name, "render", identity, max_bytes):
         return services.renders.submit(request, caller.name, identity=identity)
@@ -198,8 +253,12 @@ def _check(request: QueuedRender, view_name: str, transfer: OpenBake) -> int:
         check_encoder()
     if transfer.camera_mode is CameraMode.FREE:
         check_picture_size(request.size or (view.width, view.height))
-    elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
-        allowed = f"at most {view.width}×{view.height}, the baked size; bake a larger size for more"
+    elif (
+        not request.rebake
+        and request.size is not None
+        and (request.size[0] > view.width or request.size[1] > view.height)
+    ):
+        allowed = f"at most {view.width}×{view.height}, the baked size; rebake renders any size"
         raise ParameterError("size", list(request.size), allowed)
     pointers = look_pointers(request)
     _check_looks(request, transfer, pointers)
@@ -223,29 +282,34 @@ def list_renders(
 ) -> list[RenderBody]:
     """List batches, newest first, filtered by state, bake, name or user; 100 without a `limit`."""
     job_filter = JobFilter(state, user, bake, name)
-    return [_body(job) for job in list_jobs(services.renders, job_filter, page)]
+    return [_body(job, services) for job in list_jobs(services.renders, job_filter, page)]
 
 
 @router.get("/{render}")
 def get_render(render: Id, services: ServicesDep) -> RenderBody:
     """State and progress of a batch."""
-    return _body(services.renders.get(render))
+    return _body(services.renders.get(render), services)
 
 
 @router.delete("/{render}", status_code=204)
 def delete_render(render: Id, services: ServicesDep) -> Response:
-    """Stop a batch and delete its images."""
+    """Stop a batch and delete its images; a bake that it waits for is canceled, and can be resumed."""
+    waits_for = _unfinished_bakes(services.renders.get(render), services)
     services.renders.delete(render)
+    for bake in waits_for:
+        services.bakes.cancel(bake.id)
     services.access.quotas.disown("render", render)
     return Response(status_code=204)
 
 
 @router.post("/{render}/resume", status_code=202)
-def resume_render(render: Id, services: ServicesDep) -> RenderBody:
-    """Resume a failed batch; finished images are kept."""
+def resume_render(render: Id, services: ServicesDep, caller: CallerDep) -> RenderBody:
+    """Resume a failed batch, and a bake that it waits for; finished images are kept."""
     services.access.quotas.check_room()
+    for bake in _unfinished_bakes(services.renders.get(render), services):
+        queue_bake(bake.scene, bake.recipe, caller, services)
     services.renders.resume(render)
-    return _body(services.renders.get(render))
+    return _body(services.renders.get(render), services)
 
 
 @router.post("/{render}/frames/{index}/retry", status_code=202)
@@ -253,7 +317,7 @@ def retry_frame(render: Id, index: FrameIndex, services: ServicesDep) -> RenderB
     """Render one image of a ready or failed batch again, and all missing ones."""
     services.access.quotas.check_room()
     services.renders.retry(_job_with_frame(render, index, services), index)
-    return _body(services.renders.get(render))
+    return _body(services.renders.get(render), services)
 
 
 def _job_with_frame(identity: str, index: int, services: Services) -> RenderJob:
@@ -335,8 +399,20 @@ def _state(job: RenderJob) -> str:
     return f"it is {job.state}, try again later"
 
 
-def _body(job: RenderJob) -> RenderBody:
+def _unfinished_bakes(job: RenderJob, services: Services) -> list[BakeStatus]:
+    """Bakes that a batch started and waits for."""
+    if not job.request.rebake:
+        return []
+    with suppress(NotFoundError):
+        bakes = map(services.bakes.get, dict.fromkeys(bake for bake, _ in job.request.bake_views))
+        return [status for status in bakes if status.state != "ready"]
+    return []
+
+
+def _body(job: RenderJob, services: Services) -> RenderBody:
     request = job.request
+    waits_for = _unfinished_bakes(job, services) if job.state in ACTIVE_STATES else []
+    baking = min((bake.progress for bake in waits_for), default=None)
     names = "bake", "view", "views", "name", "format", "size", "priority", "warnings"
     request_fields = {name: getattr(request, name) for name in names}
-    return RenderBody.from_object(job, **request_fields, **format_timestamps(job))
+    return RenderBody.from_object(job, baking=baking, **request_fields, **format_timestamps(job))

@@ -80,6 +80,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/bakes/{bake}/events": {"GET": VIEW},
     "/api/bakes/{bake}/views/{view}/materials.png": {"GET": VIEW},
     "/api/bakes/{bake}/environment.png": {"GET": VIEW},
+    "/api/bakes/{bake}/light-mix": {"POST": VIEW},
     "/api/bakes/{bake}/probes": {"GET": VIEW},
     "/api/bakes/{bake}/probes/{array}": {"GET": VIEW},
     "/api/bakes/{bake}/session": {SOCKET: VIEW},
@@ -101,6 +102,7 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/shares": {"GET": VIEW, "POST": EDIT},
     "/api/looks/{name}/thumbnail": {"PUT": EDIT},
     "/api/looks/{name}/thumbnail.webp": {"GET": VIEW},
+    "/api/looks/{name}/view": {"PUT": EDIT, "DELETE": EDIT},
     "/api/shares/{share}": {"GET": VIEW, "DELETE": EDIT},
     "/api/solve": {"POST": VIEW},
 }

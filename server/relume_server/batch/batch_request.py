@@ -34,6 +34,13 @@ def resolve_looks(request: RenderRequest, store: LookStore, max_bytes: int) -> Q
     return QueuedRender.model_construct(**fields)
 
 
+def _check_saved_views(request: QueuedRender) -> None:
+    if request.views:
+        raise ParameterError("/views", Description("a list of views"), "none with saved_views")
+    if request.is_animation or request.format == "mp4":
+        raise ParameterError("/saved_views", True, "false for animations, or one image of each look")
+
+
 def _saved_documents(names: list[str], store: LookStore, max_bytes: int) -> list[dict[str, Any]]:
     documents, num_bytes = [], 0
     for name in names:
@@ -57,7 +64,9 @@ def look_pointers(request: QueuedRender) -> list[str]:
 
 def check_views(request: QueuedRender) -> None:
     """Check that a batch has views, and that all its parts are of a batch with so many. Raises ParameterError."""
-    if (request.view is None) == (not request.views):
+    if request.saved_views:
+        _check_saved_views(request)
+    elif (request.view is None) == (not request.views):
         value = None if request.view is None else request.view
         raise ParameterError("/view", value, "either view, or a list of views")
     if len(request.views) > 1 and request.format == "mp4":
@@ -65,6 +74,8 @@ def check_views(request: QueuedRender) -> None:
     if len(request.views) > 1 and isinstance(request.path, CameraPath):
         value = Description(f"a list of {len(request.views)} views")
         raise ParameterError("/views", value, "one view, because the cameras of path are those of one")
+    if request.rebake and request.size is None:
+        raise ParameterError("/size", None, "the size to bake")
     if request.frame_step > 1 and not request.is_animation:
         raise ParameterError("/frame_step", request.frame_step, "1, or frames or path for an animation")
     limit = MAX_IMAGES if request.format == "contact_sheet" else MAX_FRAMES

@@ -109,7 +109,7 @@ def pack(
         context: context of the process. report, is_canceled: callbacks.
         frames: path and archive name of each image. archive: file to write.
         video: video file to write, or None. fps: its frames per second.
-        sheet: `path` and `labels` of the contact sheet to write, or None.
+        sheet: `path`, archive `name` and `labels` of the contact sheet to write, or None.
     """
     if video is not None:
         target = Path(video)
@@ -119,4 +119,6 @@ def pack(
     with atomic_write(Path(archive)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive_zip:
         for path, name in frames:
             archive_zip.write(path, name)
+        if sheet is not None:
+            archive_zip.write(sheet["path"], sheet["name"])
     return {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -15,14 +16,16 @@ from relume.core.folder_size import folder_bytes
 from relume.output.contact_sheet import CELL_BYTES
 from relume.output.file_names import safe_stem
 from relume_server.schemas.renders import RENDER_PLACEHOLDER, QueuedRender, RenderRequest
-from relume_worker.jobs.job import Job
+from relume_worker.jobs.job import Job, NotReadyError
 from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
 from relume_worker.jobs.job_service import JobService
+from relume_worker.status import BakeStatus
 
 _AOV_BYTES = 4 * 39  # of a pixel: 32-bit floats
 
 RenderJob = Job[QueuedRender]
+BAKE_POLL_S = 0.5
 HEAD_BYTES = 1 << 16
 """Upper bound of an image file's size without pixels."""
 LAYER_FOLDERS = ".layers-*"
@@ -39,17 +42,20 @@ class RenderJobs(JobKind[QueuedRender]):
         service: JobService,
         data: Path,
         scene_name: Callable[[str], str],
+        find_bake: Callable[[str], BakeStatus],
         report_bytes: Callable[[str, int], object],
         notify: Callable[[RenderJob], object] = lambda job: None,
     ) -> None:
         """
         Args:
             service: runs the jobs. data: data directory. scene_name: of a bake's id.
+            find_bake: state of a bake by its id.
             report_bytes: called with the id of a finished render, and the size of its files in bytes.
             notify: called when a render is ready or has failed.
         """
         super().__init__(service, data / "renders")
-        self._scene_name, self._report_bytes, self._notify = scene_name, report_bytes, notify
+        self._scene_name, self._find_bake = scene_name, find_bake
+        self._report_bytes, self._notify = report_bytes, notify
 
     def steps(self, request: QueuedRender) -> int:
         """One step per image."""
@@ -124,10 +130,12 @@ class RenderJobs(JobKind[QueuedRender]):
         self.requeue(job.id, ("ready", "failed"), remove_files)
 
     def run(self, run: JobRun[QueuedRender]) -> None:
-        """Render the missing images, and pack all."""
+        """Render the missing images when their bakes are ready, and pack all."""
         job, missing = run.job, self.missing(run.job)
         done = job.total - len(missing)
         run.record(done)
+        for bake in dict.fromkeys(bake for bake, _ in job.request.bake_views):
+            self._wait_for_bake(run, bake, done)
         _remove_unfinished(run.folder)
         views = {each: self._view_values(job.request, *each) for each in set(job.request.bake_views)}
         frames = {}
@@ -137,9 +145,26 @@ class RenderJobs(JobKind[QueuedRender]):
         run.timed_steps("frame of a batch", frames, done)
         self._pack(run)
 
+    def _wait_for_bake(self, run: JobRun[QueuedRender], bake: str, done: int) -> None:
+        """Wait until a bake is ready. Raises NotReadyError if it failed or was canceled."""
+        while (status := self._find_bake(bake)).state != "ready":
+            if status.final:
+                reason = f": {status.problem}" if status.problem else ""
+                raise NotReadyError(f"the bake of these images is {status.state}{reason}; resume the render")
+            time.sleep(BAKE_POLL_S)
+            run.record(done)
+
     def _view_values(self, request: QueuedRender, bake: str, view: str) -> dict[str, Any]:
         """Arguments of the steps of a view, whose request is of this view alone."""
-        single = {"bake": bake, "view": view, "views": [], "file_names": [], "labels": [], "warnings": []}
+        single = {
+            "bake": bake,
+            "view": view,
+            "views": [],
+            "look_views": [],
+            "file_names": [],
+            "labels": [],
+            "warnings": [],
+        }
         document = request.model_copy(update=single).model_dump(mode="json")
         return {"request": document, "scene_name": self._scene_name(bake)}
 
@@ -148,7 +173,8 @@ class RenderJobs(JobKind[QueuedRender]):
         frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
         video = str(self.video_path(job)) if job.request.format == "mp4" else None
         is_sheet = job.request.format == "contact_sheet"
-        sheet = {"path": str(self.sheet_path(job)), "labels": job.request.labels} if is_sheet else None
+        name = f"contact-sheet-{self.sheet_name(job)}"
+        sheet = {"path": str(self.sheet_path(job)), "name": name, "labels": job.request.labels} if is_sheet else None
         archive = str(self.archive_path(job))
         values = {"frames": frames, "archive": archive, "video": video, "fps": job.request.fps, "sheet": sheet}
         run.step("archive of a batch", values, num_bytes=folder_bytes(run.folder))

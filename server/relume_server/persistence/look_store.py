@@ -33,6 +33,7 @@ class SavedLook:
         document: JSON, with the members in the given order.
         etag: quoted, as in the header.
         has_thumbnail: true if there is a thumbnail of this version.
+        view: JSON of the view that was saved with it; None without one.
     """
 
     name: str
@@ -41,6 +42,7 @@ class SavedLook:
     modified: float
     created: float
     has_thumbnail: bool = False
+    view: str | None = None
 
     @property
     def num_bytes(self) -> int:
@@ -50,7 +52,7 @@ class SavedLook:
 
 @dataclass(frozen=True)
 class ListedLook:
-    """A look in a list; `num_bytes` of its document."""
+    """A look in a list; `num_bytes` of its document. `view`: as of a saved look."""
 
     name: str
     etag: str
@@ -58,6 +60,7 @@ class ListedLook:
     created: float
     has_thumbnail: bool
     num_bytes: int
+    view: str | None
 
 
 def check_name(name: str) -> str:
@@ -106,7 +109,7 @@ class LookStore:
         has_thumbnail = func.coalesce(LookRow.thumbnail_of == LookRow.etag, False)
         created = func.coalesce(LookRow.created, LookRow.modified)
         num_bytes = func.length(LookRow.document)
-        columns = LookRow.name, LookRow.etag, LookRow.modified, created, has_thumbnail, num_bytes
+        columns = LookRow.name, LookRow.etag, LookRow.modified, created, has_thumbnail, num_bytes, LookRow.view
         with self._sessions() as session:
             rows = session.execute(select(*columns).order_by(LookRow.modified.desc(), LookRow.name))
             return [ListedLook(*row) for row in rows]
@@ -172,6 +175,12 @@ class LookStore:
             raise PreconditionRequiredError("send If-Match with the version of the look that the thumbnail shows")
         self._change(name, if_match, update(LookRow).values(thumbnail=picture, thumbnail_of=LookRow.etag))
 
+    def put_view(self, name: str, view: str | None, if_match: str | None) -> None:
+        """Store the view of a look, JSON; later versions keep it. Raises as `put` if the look has another version."""
+        if if_match is None:
+            raise PreconditionRequiredError("send If-Match with the version of the look that the view belongs to")
+        self._change(name, if_match, update(LookRow).values(view=view))
+
     def delete(self, name: str, if_match: str | None) -> None:
         """Delete a look. Raises as `put`."""
         if if_match is None:
@@ -206,4 +215,5 @@ class LookStore:
 
 def _saved(row: LookRow) -> SavedLook:
     created = row.modified if row.created is None else row.created
-    return SavedLook(row.name, row.document, row.etag, row.modified, created, row.thumbnail_of == row.etag)
+    has_thumbnail = row.thumbnail_of == row.etag
+    return SavedLook(row.name, row.document, row.etag, row.modified, created, has_thumbnail, row.view)

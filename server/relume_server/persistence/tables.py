@@ -14,6 +14,7 @@ class LookRow(Base):
     Attributes:
         created, modified: seconds since 1970; `created` is None in rows of older versions.
         thumbnail: WebP. thumbnail_of: its version; None if there is none.
+        view: JSON of a `LookView`; None if there is none.
     """
 
     __tablename__ = "looks"
@@ -25,6 +26,7 @@ class LookRow(Base):
     created: Mapped[float | None]
     thumbnail: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     thumbnail_of: Mapped[str | None]
+    view: Mapped[str | None] = mapped_column(Text)
 
 
 class ShareRow(Base):

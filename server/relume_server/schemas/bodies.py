@@ -12,7 +12,7 @@ from relume.look.document import MAX_BOUNCES
 from relume.look.model import PathFilter
 from relume.scene_io.import_options import ImportOptions
 from relume_server.schemas.base import Body, Id, Name
-from relume_server.schemas.cameras import CameraBody, CameraFrame
+from relume_server.schemas.cameras import CameraBody, CameraFrame, LookView
 from relume_server.schemas.comments import MAX_PICTURE_TEXT
 from relume_server.schemas.protocol import MAX_VISIBLE_VIEWS
 from relume_server.schemas.renders import Side
@@ -295,9 +295,23 @@ class DryRunBody(Body):
     plan: PlanBody
 
 
+class RenderPlanBody(Body):
+    """Response to a dry run: nothing was queued.
+
+    `file_names`: of the first images, of `total`. `bytes`: upper bound of all files. `bakes`: bakes that the render
+    starts and waits for, with their costs.
+    """
+
+    file_names: list[str]
+    total: int
+    bytes: int
+    warnings: list[str]
+    bakes: list[DryRunBody]
+
+
 class LookEntry(Body):
     """A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this
-    version's image, relative to the server, null if there is none.
+    version's image, relative to the server, null if there is none. `view`: saved with the look, null if none was.
     """
 
     name: str
@@ -306,6 +320,7 @@ class LookEntry(Body):
     modified: str
     bytes: int
     thumbnail: str | None
+    view: LookView | None
 
 
 class ThumbnailRequest(Body):

@@ -51,6 +51,13 @@ class CameraEntry(CameraBody):
     is_placed: bool
 
 
+class LookView(Body):
+    """The view of a saved look: a view by name, and the pose of its free camera; null: as baked."""
+
+    view: Name
+    camera: CameraFrame | None = None
+
+
 class ViewportBody(Body):
     """Bounds of a scene, meters; a camera that sees all of it; one in its largest room, null if nothing is enclosed.
 

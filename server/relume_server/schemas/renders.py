@@ -133,6 +133,9 @@ class RenderRequest(Animation):
     `file_name`: name of each image with fields, such as "{scene}_{view}_{look}.{frame:04}.exr"; fields are `scene`,
     `bake`, `view`, `look` and `frame`, a number with up to 9 digits. Frames, or looks without `frames` and `path`, are
     numbered from `start_frame`; of an animation only each `frame_step`-th is rendered, and has its number.
+    `saved_views`: render each saved look in the view saved with it, and the others in `view`. `rebake`: if a bake with
+    fixed cameras has another size than `size`, bake its views with this size first. `dry_run`: check everything, queue
+    nothing, and return names and cost.
     `priority`: among renders of the same user, higher ones first. `webhook`: address that gets a signed message when
     the render has ended, see docs/operations.md.
 
@@ -153,6 +156,9 @@ class RenderRequest(Animation):
     views: list[BakeView] = Field(default_factory=list, max_length=MAX_VIEWS)
     format: RenderFormat
     size: tuple[Side, Side] | None = None
+    saved_views: bool = False
+    rebake: bool = False
+    dry_run: bool = False
     name: Name | None = None
     file_name: Name | None = None
     start_frame: Annotated[int, Field(ge=0, le=MAX_FRAME_NUMBER)] = 0
@@ -200,13 +206,29 @@ class RenderRequest(Animation):
 class QueuedRender(RenderRequest):
     """A request whose looks are all documents, as it is stored.
 
+    `look_views`: the view of each look, if they have their own; the cameras are those of `path`.
     `file_names`: of all images. `labels`: of all images of a contact sheet. `warnings`: a sentence for each thing that
     is not as in the looks.
     """
 
+    look_views: list[Name] = Field(default_factory=list)
     file_names: list[str] = Field(default_factory=list)
     labels: list[str] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)
+
+    @property
+    def bake_views(self) -> list[tuple[str, str]]:
+        """Bake and view of each group of images, or of the looks."""
+        return [(self.bake, view) for view in dict.fromkeys(self.look_views)] or super().bake_views
+
+    @property
+    def num_images(self) -> int:
+        """Number of images of all views."""
+        return len(self.look_views) or super().num_images
+
+    def image(self, index: int) -> tuple[str, str, int]:
+        """Bake, view and frame of an image."""
+        return (self.bake, self.look_views[index], index) if self.look_views else super().image(index)
 
 
 RENDER_PLACEHOLDER = QueuedRender(bake="0" * 16, view="unknown", looks=[{}], format="png")
@@ -216,9 +238,10 @@ RENDER_PLACEHOLDER = QueuedRender(bake="0" * 16, view="unknown", looks=[{}], for
 class RenderBody(Body):
     """A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one.
 
-    `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without
-    login. `view`: null if there are several `views`. `warnings`: a sentence for each part of a light mix that a scene
-    does not have. `created`, `started` and `ended` are times; null: not yet.
+    `baking`: progress 0…1 of a bake that it waits for; null: none. `seconds_left`: null if it is not running or nothing
+    has been measured yet. `user`: who requested it; "" without login. `view`: null if there are several `views`.
+    `warnings`: a sentence for each part of a light mix that a scene does not have. `created`, `started` and `ended` are
+    times; null: not yet.
     """
 
     id: str
@@ -240,3 +263,4 @@ class RenderBody(Body):
     progress: float
     seconds_left: float | None
     problem: str | None
+    baking: float | None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ def test_light_mix_and_contact_sheet(editor: Editor, tmp_path: Path) -> None:
     assert np.abs(editor.pixels() - dimmed).mean() > 0.5
     path.write_text(json.dumps({**mix, "lights": {"Kicker": {"intensity": 2}}}))
     drop(page, path)
-    expect(page.get_by_text("This look has no lights “Kicker”; the others are set.")).to_be_visible()
+    expect(page.get_by_text("lights that the scene does not have: 'Kicker'")).to_be_visible()
     assert np.abs(editor.pixels() - dimmed).max() <= 1
 
     page.get_by_role("button", name="Save look").click()
@@ -49,9 +50,19 @@ def test_light_mix_and_contact_sheet(editor: Editor, tmp_path: Path) -> None:
     name.press("Enter")
     expect(page.get_by_role("button", name="Rename Look").first).to_be_visible()
     page.get_by_role("button", name="More export formats").press("Enter")
+    page.get_by_role("button", name="Render…").press("Enter")
+    dialog = page.get_by_role("dialog", name="Render")
+    dialog.get_by_role("checkbox", name="Current look").check()
+    dialog.get_by_role("checkbox", name="Contact sheet").check()
+    expect(dialog.get_by_role("status", name="Result")).to_contain_text("2 images: ", timeout=WAIT_MS)
+    page.screenshot(path=tmp_path / "render.png")
     with page.expect_download(timeout=WAIT_MS) as download:
-        page.get_by_role("button", name="Contact sheet").press("Enter")
-    download.value.save_as(tmp_path / "sheet.png")
-    with Image.open(tmp_path / "sheet.png") as sheet:
+        dialog.get_by_role("button", name="Render", exact=True).click()
+    download.value.save_as(tmp_path / "all.zip")
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        names = archive.namelist()
+        archive.extract(names[2], tmp_path)
+    assert names[:2] == ["still-life_front_Current.png", "still-life_front_Look-1.png"]
+    with Image.open(tmp_path / names[2]) as sheet:
         sheet.load()
         assert min(sheet.size) > 100

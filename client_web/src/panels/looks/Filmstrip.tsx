@@ -4,11 +4,9 @@ import { isDeepEqual } from "../../state/document/difference";
 import { previewedStep, replaceLook } from "../../edit/edit";
 import { history } from "../../edit/history";
 import { splitStepLabel } from "../../edit/stepLabel";
-import { connectToBake } from "../../session/connect";
 import type { Look } from "../../protocol";
-import { bake } from "../../state/bakes";
 import { defaultLook, look } from "../../state/look";
-import { mayEdit, joinTarget } from "../../state/sessionUser";
+import { mayEdit } from "../../state/sessionUser";
 import { timelineOpen } from "../../state/panels";
 import { scene } from "../../state/scene";
 import { lookThumbnail, thumbnailRevision } from "../../state/thumbnails";
@@ -17,7 +15,17 @@ import { EditableName } from "../../ui/EditableName";
 import { Icon } from "../../ui/Icon";
 import { completeLook, justSaved, storeLookAsA, saveLook, sideA } from "./abCompare";
 import { thumbnailOf, variantThumbnail } from "./namedThumbnails";
-import { deleteLook, refreshSavedLooks, renameLook, savedLooks, updateLook, type SavedLook } from "./savedLooks";
+import { currentView } from "./lookViews";
+import {
+  deleteLook,
+  refreshSavedLooks,
+  renameLook,
+  savedLooks,
+  setLookView,
+  updateLook,
+  type SavedLook,
+} from "./savedLooks";
+import { showSaved } from "./showLook";
 import { goToStep } from "./undoRedo";
 import { serverUrl } from "../../session/net/serverUrl";
 
@@ -47,15 +55,7 @@ function TileImage({ image, text }: { image: string | null; text: string }) {
   );
 }
 
-/** Apply a saved look; for a read-only user, a new session starts with it. */
-function showSaved(name: string, fullLook: Look): void {
-  const [openScene, current] = [scene.value, bake.value];
-  if (mayEdit.value || openScene === null || current === null) return replaceLook(`Show ${name}`, fullLook);
-  joinTarget.value = { scene: openScene.id, look: name };
-  connectToBake(current);
-}
-
-function SavedTile({ saved }: { saved: SavedLook }) {
+function SavedTile({ saved, number }: { saved: SavedLook; number: number }) {
   void thumbnailRevision.value;
   const fullLook = completeLook(saved.look);
   const isDisplayed = isDeepEqual(fullLook, look.value);
@@ -64,8 +64,9 @@ function SavedTile({ saved }: { saved: SavedLook }) {
       <button
         class="tile-picture"
         aria-label={`Show ${saved.name}`}
+        title={number <= 9 ? `Show ${saved.name} (${number})` : `Show ${saved.name}`}
         aria-pressed={isDisplayed}
-        onClick={() => showSaved(saved.name, fullLook)}
+        onClick={() => showSaved(saved)}
       >
         <TileImage image={thumbnailOf(saved.etag)} text={saved.name} />
         {sideA.value?.label === saved.name && <span class="mark">A</span>}
@@ -84,6 +85,16 @@ function SavedTile({ saved }: { saved: SavedLook }) {
           label={`Overwrite ${saved.name} with the current look`}
           disabled={isDisplayed || !mayEdit.value}
           onClick={() => look.value && void updateLook(saved, look.value)}
+        />
+        <IconButton
+          icon={saved.view === null ? "view" : "lock"}
+          label={
+            saved.view === null
+              ? `Save this view with ${saved.name}`
+              : `Remove view “${saved.view.view}” from ${saved.name}`
+          }
+          disabled={!mayEdit.value}
+          onClick={() => void setLookView(saved, saved.view === null ? currentView() : null)}
         />
         <IconButton
           icon="trash"
@@ -234,8 +245,8 @@ export function Filmstrip() {
       </button>
       {defaultLook.value !== null && savedLooks.value.length > 0 && (
         <ul class="tiles saved" aria-label="Saved looks">
-          {savedLooks.value.map((saved) => (
-            <SavedTile key={saved.name} saved={saved} />
+          {savedLooks.value.map((saved, index) => (
+            <SavedTile key={saved.name} saved={saved} number={index + 1} />
           ))}
         </ul>
       )}

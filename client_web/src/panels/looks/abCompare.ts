@@ -19,6 +19,7 @@ import { scene } from "../../state/scene";
 import { lookThumbnail } from "../../state/thumbnails";
 import { reportErrors, showNote } from "../../ui/toasts";
 import { renderThumbnail } from "./displayImage";
+import { currentView } from "./lookViews";
 import { addLook, unusedName } from "./savedLooks";
 
 /** The look whose image is stored as A, its label, and its cameras. */
@@ -93,7 +94,7 @@ export async function saveLook(): Promise<void> {
   if (name === undefined) return;
   filmstripOpen.value = true;
   justSaved.value = name;
-  await addLook(name, current, image); // without an image, the thumbnail is taken when the look is shown exactly
+  await addLook(name, current, image, currentView()); // without an image, the thumbnail is taken when the look is shown exactly
 }
 
 // by default, A is the look that the scene opened with

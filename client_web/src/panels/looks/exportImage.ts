@@ -17,10 +17,8 @@ import { scene } from "../../state/scene";
 import { activeViewName } from "../../state/views";
 import { interpolateLooks } from "../../session/net/api";
 import { reportErrors, showError, showNote } from "../../ui/toasts";
-import { completeLook } from "./abCompare";
 import { encodePng } from "./displayImage";
 import { download, renderAndSave } from "./renderJob";
-import { savedLooks } from "./savedLooks";
 
 /** The server's limit of a file name's length. */
 const LONGEST_STEM = 120;
@@ -94,19 +92,6 @@ export function exportExr(contents: ExrContents): Promise<void> {
     ...contents,
     color_space: availableExrSpace.value,
     name: fileStem(exrKind(contents), availableExrSpace.value ?? ""),
-    path: pose === null ? null : { cameras: [pose] },
-  });
-}
-
-/** Export all saved looks of the scene in the active view, with their names, as one PNG. */
-export async function exportContactSheet(): Promise<void> {
-  const saved = savedLooks.peek();
-  if (saved.length === 0) return showNote("Save a look first: a contact sheet has all saved looks.");
-  const pose = currentPose();
-  return startExport("contact sheet", "contact-sheet.png", {
-    format: "contact_sheet",
-    looks: saved.map((each) => completeLook(each.look)) as unknown as NonNullable<RenderRequest["looks"]>,
-    look_names: saved.map(({ name }) => name),
     path: pose === null ? null : { cameras: [pose] },
   });
 }

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { deleteRender, getRender, problemText, startRender, nullIfUnavailable } from "../../session/net/api";
 import type { RenderBody, RenderRequest } from "../../protocol";
+import { renderedBake } from "../../state/bakes";
 import { saveInTab, loadFromTab } from "../../state/tabSession";
 import { formatSeconds } from "../../ui/scale";
 import { reportErrors, showNote } from "../../ui/toasts";
@@ -21,11 +22,14 @@ interface ExportJob {
 export const exporting = signal<{
   exportName: string;
   progress: number;
+  /** Progress of a bake that the images wait for; null: none. */
+  baking: number | null;
   secondsLeft: number | null;
   stop: (() => void) | null;
 } | null>(null);
 
-export function exportText({ exportName, progress, secondsLeft }: NonNullable<typeof exporting.value>): string {
+export function exportText({ exportName, progress, baking, secondsLeft }: NonNullable<typeof exporting.value>): string {
+  if (baking !== null) return `${exportName}: baking ${Math.floor(100 * baking)} %`;
   const left = secondsLeft === null ? "" : `, ${formatSeconds(secondsLeft)} left`;
   return `${exportName} ${Math.floor(100 * progress)} %${left}`;
 }
@@ -50,11 +54,11 @@ async function finishRendering({ id, exportName }: ExportJob): Promise<RenderBod
     const state = await nullIfUnavailable(getRender(id));
     if (isStopped()) return null;
     if (state?.state === "ready" || state?.state === "failed") return state;
-    const { progress, seconds_left: secondsLeft } = state ?? {
-      progress: exporting.peek()?.progress ?? 0,
-      seconds_left: null,
-    };
-    exporting.value = { exportName, progress, secondsLeft, stop };
+    const last = exporting.peek();
+    const { progress, seconds_left: secondsLeft } = state ?? { progress: last?.progress ?? 0, seconds_left: null };
+    const baking = state === null ? (last?.baking ?? null) : state.baking;
+    renderedBake.value = state?.bake ?? renderedBake.peek();
+    exporting.value = { exportName, progress, baking, secondsLeft, stop };
     await new Promise((waited) => setTimeout(waited, POLL_MS));
     if (isStopped()) return null;
   }
@@ -77,7 +81,7 @@ async function pollRendering(rendering: ExportJob): Promise<void> {
 
 /** Run `work` unless another export is running; report errors. */
 async function runExport(exportName: string, work: () => Promise<void>): Promise<void> {
-  exporting.value = { exportName, progress: 0, secondsLeft: null, stop: null };
+  exporting.value = { exportName, progress: 0, baking: null, secondsLeft: null, stop: null };
   await reportErrors(async () => {
     try {
       await work();

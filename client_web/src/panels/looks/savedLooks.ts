@@ -3,7 +3,8 @@ import { signal } from "@preact/signals";
 import { history } from "../../edit/history";
 import type { NamedLook } from "../../edit/history";
 import { ApiError, json, request } from "../../session/net/api";
-import type { Light, Look, LookEntry } from "../../protocol";
+import type { Light, Look, LookEntry, LookView } from "../../protocol";
+import { isDeepEqual } from "../../state/document/difference";
 import { scene } from "../../state/scene";
 import { lookThumbnail } from "../../state/thumbnails";
 import { reportErrors } from "../../ui/toasts";
@@ -13,6 +14,7 @@ import { fetchThumbnail, uploadThumbnail, cacheThumbnail, thumbnailOf } from "./
 export interface SavedLook extends NamedLook {
   etag: string;
   created: string;
+  view: LookView | null;
 }
 
 export const savedLooks = signal<SavedLook[]>([]);
@@ -30,10 +32,11 @@ function fitsScene(look: Partial<Look>): boolean {
   );
 }
 
-async function readSavedLook({ name, etag, created, thumbnail }: LookEntry): Promise<SavedLook> {
+async function readSavedLook({ name, etag, created, thumbnail, view }: LookEntry): Promise<SavedLook> {
   const response = await request(path(name));
   if (thumbnail !== null && thumbnailOf(etag) === null) cacheThumbnail(etag, thumbnail);
-  return { name, etag: response.headers.get("etag") ?? etag, created, look: (await response.json()) as Partial<Look> };
+  const document = (await response.json()) as Partial<Look>;
+  return { name, etag: response.headers.get("etag") ?? etag, created, view, look: document };
 }
 
 /** Sorted by the time of their first save, as formatted by the server. */
@@ -73,7 +76,18 @@ function etagOf(name: string): string | null {
   return savedLooks.value.find((entry) => entry.name === name)?.etag ?? null;
 }
 
-async function writeLook({ name, look, created }: NamedLook, etag: string | null, image: string | null): Promise<void> {
+/** Store the view of a look version; null: none. */
+async function writeView(name: string, etag: string, view: LookView | null): Promise<void> {
+  const headers = { "If-Match": etag };
+  const init = view === null ? { method: "DELETE", headers } : json("PUT", view, headers);
+  await request(`${path(name)}/view`, init).catch((error: unknown) => reportConflict(error, name));
+}
+
+async function writeLook(
+  { name, look, created, view = null }: NamedLook,
+  etag: string | null,
+  image: string | null,
+): Promise<void> {
   const headers: Record<string, string> = etag === null ? { "If-None-Match": "*" } : { "If-Match": etag };
   const query = etag === null && created !== undefined ? `?created=${encodeURIComponent(created)}` : "";
   const response = await request(path(name) + query, json("PUT", look, headers)).catch((error: unknown) =>
@@ -81,7 +95,8 @@ async function writeLook({ name, look, created }: NamedLook, etag: string | null
   );
   const existing = savedLooks.value.find((entry) => entry.name === name);
   const since = existing?.created ?? ((await response.json()) as LookEntry).created;
-  const saved = { name, etag: response.headers.get("etag") ?? "", created: since, look };
+  const saved = { name, etag: response.headers.get("etag") ?? "", created: since, look, view };
+  if (!isDeepEqual(view, existing?.view ?? null)) await writeView(name, saved.etag, view);
   savedLooks.value = sortByCreation([...savedLooks.value.filter((entry) => entry !== existing), saved]);
   if (image !== null) cacheThumbnail(saved.etag, image);
   await uploadThumbnail(path(name), saved.etag);
@@ -103,7 +118,11 @@ export async function exchangeSavedLook(
   image: string | null = null,
 ): Promise<void> {
   if (to !== null)
-    await writeLook({ created: from?.created, ...to }, from?.name === to.name ? etagOf(to.name) : null, image);
+    await writeLook(
+      { created: from?.created, view: from?.view ?? null, ...to },
+      from?.name === to.name ? etagOf(to.name) : null,
+      image,
+    );
   if (from !== null && from.name !== to?.name) await eraseLook(from.name);
 }
 
@@ -146,10 +165,16 @@ async function queueChange(
   if (pendingChange === operation) pendingChange = null;
 }
 
-const toNamedLook = ({ name, look, created }: SavedLook): NamedLook => ({ name, look, created });
+const toNamedLook = ({ name, look, created, view }: SavedLook): NamedLook => ({ name, look, created, view });
 
-export function addLook(name: string, look: Look, image: string | null): Promise<void> {
-  return queueChange(`Save ${name}`, null, { name, look }, image);
+export function addLook(name: string, look: Look, image: string | null, view: LookView | null): Promise<void> {
+  return queueChange(`Save ${name}`, null, { name, look, view }, image);
+}
+
+/** Set the view of a saved look; null: none. */
+export function setLookView(saved: SavedLook, view: LookView | null): Promise<void> {
+  const label = view === null ? `Remove view of ${saved.name}` : `Set view of ${saved.name}`;
+  return queueChange(label, toNamedLook(saved), { ...toNamedLook(saved), view }, thumbnailOf(saved.etag));
 }
 
 export function deleteLook(saved: SavedLook): Promise<void> {

@@ -12,6 +12,7 @@ import type {
   ImageBody,
   ZernikeFitBody,
   ZernikeFitRequest,
+  Look,
   LooksBody,
   LooksRequest,
   MaterialBody,
@@ -21,10 +22,12 @@ import type {
   ImportedBody,
   MeasuredBody,
   MetalnessBody,
+  MixedLookBody,
   ModelBody,
   OcioView,
   Problem,
   RenderBody,
+  RenderPlanBody,
   RenderRequest,
   SceneBody,
   ShareBody,
@@ -234,9 +237,18 @@ export async function getZernikeFit(body: ZernikeFitRequest): Promise<ZernikeFit
 export async function startRender(body: RenderRequest): Promise<RenderBody> {
   return (await (await request("/api/renders", json("POST", body))).json()) as RenderBody;
 }
+/** Names, cost and warnings of a render; nothing is queued. */
+export async function planRender(body: RenderRequest): Promise<RenderPlanBody> {
+  return (await (await request("/api/renders", json("POST", { ...body, dry_run: true }))).json()) as RenderPlanBody;
+}
 /** The complete look of each frame of an animation. */
 export async function interpolateLooks(body: LooksRequest): Promise<LooksBody> {
   return (await (await request("/api/renders/looks", json("POST", body))).json()) as LooksBody;
+}
+/** A look with the lights of a light mix. */
+export async function mixLook(bake: string, look: Look, mix: Record<string, unknown>): Promise<MixedLookBody> {
+  const path = `/api/bakes/${encodeURIComponent(bake)}/light-mix`;
+  return (await (await request(path, json("POST", { look, mix }))).json()) as MixedLookBody;
 }
 export async function deleteRender(id: string): Promise<void> {
   await request(`/api/renders/${encodeURIComponent(id)}`, { method: "DELETE" });

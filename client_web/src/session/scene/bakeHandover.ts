@@ -4,7 +4,7 @@ import { setBakeReadyListener } from "../sessionHandlers";
 import * as api from "../net/api";
 import { waitForBake, subscribeToBake } from "../net/bakeEvents";
 import type { BakeBody, SceneBody } from "../../protocol";
-import { bake, bakes, pendingBake } from "../../state/bakes";
+import { bake, bakes, pendingBake, renderedBake } from "../../state/bakes";
 import { page } from "../../state/scene";
 import { reportErrors, showError } from "../../ui/toasts";
 import { quality, type BakeSettings } from "./bakeSettings";
@@ -45,7 +45,7 @@ export function stopTrackingBake(): void {
 // ready when the scene was opened does not: the URL or the user chose the shown one
 setBakeReadyListener((id) => {
   const current = bake.peek();
-  if (current === null || id === current) return;
+  if (current === null || id === current || id === renderedBake.peek()) return;
   if (bakes.peek().some((each) => each.id === id && each.state === "ready")) return;
   void reportErrors(async () => {
     const [readyBake, shownBake] = await Promise.all([api.getBake(id), api.getBake(current)]);
