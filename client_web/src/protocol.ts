@@ -32,6 +32,7 @@ export type {
   LooksRequest,
   LookEntry,
   LooksBody,
+  LutBody,
   MaterialMapBody,
   MeBody,
   OpenMessage,

@@ -1,5 +1,6 @@
 /** Tables of views, between whose nodes go tetrahedra. */
 import { expect, test } from "vitest";
+import { displayMatrix } from "../src/render/color/whiteBalance";
 import { sampleLut, parseLut } from "../src/render/color/lutTable";
 import { toDisplay } from "../src/render/color/tonemap";
 import { LUT_GAIN, LUT_SIZE, type Rgb } from "../src/protocol";
@@ -43,6 +44,6 @@ test.each<Rgb>([
 });
 
 test("exposure comes before a view, and what is below nothing is black", () => {
-  expect(toDisplay([0.5, 0.1, 2], 1, MIXED)).toEqual(sampleLut(MIXED, [1, 0.2, 4]));
+  expect(toDisplay([0.5, 0.1, 2], { matrix: displayMatrix(1, 6500, 0), toneMap: MIXED, lut: null })).toEqual(sampleLut(MIXED, [1, 0.2, 4]));
   expect(sampleLut(MIXED, [-1, -2, -3])).toEqual(sampleLut(MIXED, [0, 0, 0]));
 });

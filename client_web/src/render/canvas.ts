@@ -2,11 +2,10 @@
  * only its view. */
 import { effect, signal } from "@preact/signals";
 import { soloMaterial } from "../state/visibility/soloSources";
-import { toneMap } from "../state/color";
+import { displayTransform } from "../state/color";
 import { brushedRange } from "../state/curvePreview";
 import { displayedFrames, falseColor, isDisplayFrozen, isReferenceShown, wipe } from "../state/display";
 import { recordFrameShown } from "../state/latency";
-import { exposure } from "../state/look";
 import { materialNames } from "../state/scene";
 import { hoveredMaterial } from "../state/selection";
 import { focusedView, sideBySide } from "../state/views";
@@ -133,8 +132,7 @@ export class ImageCanvas implements ImagePresenter {
     return {
       held: isDisplayFrozen.value,
       transform: transformOf(view),
-      exposure: exposure.value,
-      toneMap: toneMap.value,
+      display: displayTransform.value,
       falseColor: falseColor.value,
       wipe: reference === null ? -1 : displaysA ? 2 : isOn ? position : -1,
       hover: hovered === null || ids === null ? -1 : materialNames.value.indexOf(hovered),

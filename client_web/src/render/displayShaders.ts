@@ -9,6 +9,8 @@ import { LUT_GAIN, LUT_SIZE } from "../protocol";
 export interface DisplayFeatures {
   toneMap: "none" | "agx" | "filmic" | "table";
   falseColor: boolean;
+  /** A display LUT follows the tone map. */
+  lut: boolean;
   /** The image is minified. */
   isMinified: boolean;
   /** The server has tone-mapped the image already. */
@@ -41,6 +43,7 @@ export function fragmentShader(features: DisplayFeatures): string {
           : features.toneMap === "table"
             ? "TABLE"
             : "PLAIN",
+    features.lut && !features.falseColor && "LUT",
     features.isMinified && "MINIFIED",
     features.displayReferred && "DISPLAY_REFERRED",
     features.transparent && "TRANSPARENT",
@@ -68,7 +71,7 @@ uniform usampler2D uIds;       // material of each pixel, 65535 = background
 uniform vec2 uCanvas;          // device pixels
 uniform vec4 uImageRect;           // left, top, width, height of the image, device pixels from the top left
 uniform vec2 uSize;            // size of the image in pixels
-uniform float uGain;           // 2^exposure
+uniform mat3 uDisplayMatrix;   // exposure times white balance
 uniform float uWipe;           // fraction of the image left of which the A side shows
 uniform int uHover;            // material to outline
 uniform int uSolo;             // solo material
@@ -97,24 +100,39 @@ vec3 filmic(vec3 x) {
   return srgb((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14));
 }
 
-#ifdef TABLE
-uniform highp sampler3D uTable;  // display values; blue is the quickest
-
-vec3 node(vec3 at) {
-  return texelFetch(uTable, ivec3(at.bgr), 0).rgb;
+#if defined(TABLE) || defined(LUT)
+vec3 node(highp sampler3D nodes, vec3 at) {
+  return texelFetch(nodes, ivec3(at.bgr), 0).rgb;
 }
 
 // tetrahedral interpolation: corners at 0, plus the largest fraction's axis, minus the smallest's, at 1
-vec3 table(vec3 x) {
+vec3 interpolated(highp sampler3D nodes, vec3 coordinate, float last) {
   const vec3 R = vec3(1.0, 0.0, 0.0), G = vec3(0.0, 1.0, 0.0), B = vec3(0.0, 0.0, 1.0);
-  vec3 coordinate = min(log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN)), 1.0) * LAST;
-  vec3 at = min(floor(coordinate), LAST - 1.0);
+  vec3 at = min(floor(coordinate), last - 1.0);
   vec3 fraction = coordinate - at;
   vec3 longest = fraction.r >= fraction.g ? (fraction.r >= fraction.b ? R : B) : (fraction.g >= fraction.b ? G : B);
   vec3 shortest = fraction.r < fraction.g ? (fraction.r < fraction.b ? R : B) : (fraction.g < fraction.b ? G : B);
   float largest = dot(fraction, longest), smallest = dot(fraction, shortest), middle = fraction.r + fraction.g + fraction.b - largest - smallest;
-  return (1.0 - largest) * node(at) + (largest - middle) * node(at + longest)
-    + (middle - smallest) * node(at + 1.0 - shortest) + smallest * node(at + 1.0);
+  return (1.0 - largest) * node(nodes, at) + (largest - middle) * node(nodes, at + longest)
+    + (middle - smallest) * node(nodes, at + 1.0 - shortest) + smallest * node(nodes, at + 1.0);
+}
+#endif
+
+#ifdef TABLE
+uniform highp sampler3D uTable;  // display values; blue is the quickest
+
+vec3 table(vec3 x) {
+  vec3 shaped = log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN));
+  return interpolated(uTable, min(shaped, 1.0) * LAST, LAST);
+}
+#endif
+
+#ifdef LUT
+uniform highp sampler3D uLut;  // display values by display values
+
+vec3 displayLut(vec3 x) {
+  float last = float(textureSize(uLut, 0).x - 1);
+  return interpolated(uLut, clamp(x, 0.0, 1.0) * last, last);
 }
 #endif
 
@@ -132,11 +150,8 @@ vec3 falseColor(vec3 x) {
   return vec3(1.0);
 }
 
-vec3 display(vec3 x) {
-  x *= uGain;
-#if defined(FALSE_COLOR)
-  return falseColor(x);
-#elif defined(AGX)
+vec3 toneMapped(vec3 x) {
+#if defined(AGX)
   return agx(x);
 #elif defined(FILMIC)
   return filmic(x);
@@ -144,6 +159,17 @@ vec3 display(vec3 x) {
   return table(x);
 #else
   return srgb(x);
+#endif
+}
+
+vec3 display(vec3 x) {
+  x = max(uDisplayMatrix * x, 0.0);
+#if defined(FALSE_COLOR)
+  return falseColor(x);
+#elif defined(LUT)
+  return displayLut(toneMapped(x));
+#else
+  return toneMapped(x);
 #endif
 }
 

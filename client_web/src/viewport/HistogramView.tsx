@@ -5,7 +5,7 @@ import { stage } from "../render/renderStage";
 import { bake } from "../state/bakes";
 import { displayedFrames } from "../state/display";
 import { isFrameExact } from "../state/fidelity";
-import { exposure } from "../state/look";
+import { displayGain } from "../state/look";
 import { histogramOpen } from "../state/panels";
 
 const WIDTH = 252;
@@ -73,11 +73,11 @@ function useHistogram(): { histogram: Histogram; isExact: boolean } | null {
     return () => clearTimeout(timer);
   }, [frame]);
   void bake.value; // another scene may have a view of the same name
-  const [image, stops, isExact] = [stage.active, exposure.value, isFrameExact.value];
+  const [image, matrix, isExact] = [stage.active, displayGain.value, isFrameExact.value];
   return useMemo(() => {
     const { hasPixels, pixels } = image;
-    return idleFrame < 0 || !hasPixels ? null : { histogram: computeHistogram(pixels.encoded, stops), isExact };
-  }, [idleFrame, image, stops, isExact]);
+    return idleFrame < 0 || !hasPixels ? null : { histogram: computeHistogram(pixels.encoded, matrix), isExact };
+  }, [idleFrame, image, matrix, isExact]);
 }
 
 function HistogramBars() {

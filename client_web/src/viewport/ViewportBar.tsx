@@ -2,10 +2,9 @@
 import { toDisplay } from "../render/color/tonemap";
 import { stage } from "../render/renderStage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";
-import { toneMap } from "../state/color";
+import { displayTransform } from "../state/color";
 import { openComments } from "../state/comments";
 import { displayedFrames, falseColor } from "../state/display";
-import { exposure } from "../state/look";
 import { histogramOpen } from "../state/panels";
 import { pixelProbe } from "../state/pointerPixel";
 import { shownPanels, togglePanel } from "../state/panelWidths";
@@ -17,7 +16,7 @@ function PixelProbe() {
   const image = probed === null ? null : stage.imageOf(probed.view);
   const radiance = probed === null ? null : (image?.radiance(probed.x, probed.y) ?? null);
   if (probed === null || radiance === null) return <span class="probe quiet">Hover to inspect a pixel</span>;
-  const displayed = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
+  const displayed = toDisplay(radiance, displayTransform.value).map((v) => Math.round(255 * v));
   const material = image?.ids ? image.material(probed.x, probed.y) : probed.answer?.material;
   return (
     <span class="probe">
