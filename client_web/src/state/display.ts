@@ -6,6 +6,8 @@ export const falseColor = signal(false);
 export const handlesOpen = signal(true);
 export const wipe = signal<{ isOn: boolean; position: number }>({ isOn: false, position: 0.5 });
 export const isReferenceShown = signal(false);
+/** True while a click in the image picks a gray. */
+export const isPickingGray = signal(false);
 /** True while frames of another look are captured: the canvases are frozen. */
 export const isDisplayFrozen = signal(false);
 /** Number of drawn frames. */
