@@ -81,10 +81,13 @@ def get_record(folder: Path, identity: str) -> LutRecord:
     return LutRecord(identity, document["name"], document["created"], size, tuple(map(warning_of, warnings)))
 
 
-@asset_cached("LUT")
 def load_table(name: str) -> Shaped[U16, "N N N 3"]:
     """Load the table of a look's LUT. Raises NotFoundError; SceneError if it is damaged."""
-    path = LUTS.resolve(name)
+    return _load(LUTS.resolve(name))
+
+
+@asset_cached("LUT")
+def _load(path: Path) -> U16:
     table = LUTS.open_array(path, _TABLE)
     if table.dtype != np.uint16 or table.ndim != 4 or table.shape != (*[len(table)] * 3, 3) or len(table) < 2:
         raise LUTS.damaged_error(path)

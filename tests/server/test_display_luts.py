@@ -12,12 +12,12 @@ from test_comparisons import is_done, wait_until
 
 from relume.image_io.white_balance import balance_matrix
 
-# the corners of a cube, red fastest, that swap red and blue
-SWAPPED = "LUT_3D_SIZE 2\n" + "".join(f"{b} {g} {r}\n" for b in (0, 1) for g in (0, 1) for r in (0, 1))
+# the corners of a cube, red fastest: red inverted, green as it is, half the blue
+GRADE = "LUT_3D_SIZE 2\n" + "".join(f"{1 - r} {g} {b / 2}\n" for b in (0, 1) for g in (0, 1) for r in (0, 1))
 Render = Callable[[dict[str, object]], np.ndarray]
 
 
-def upload(client: TestClient, content: str, name: str = "swap.cube") -> dict[str, object]:
+def upload(client: TestClient, content: str, name: str = "grade.cube") -> dict[str, object]:
     response = client.post("/api/luts", files={"lut": (name, content.encode())})
     assert response.status_code == 201, response.text
     body: dict[str, object] = response.json()
@@ -28,7 +28,7 @@ def upload(client: TestClient, content: str, name: str = "swap.cube") -> dict[st
 @pytest.fixture
 def render(client: TestClient, baked: Baked) -> Render:
     def rendered(display: dict[str, object]) -> np.ndarray:
-        look = {"environment": {"color": [1.0, 0.6, 0.2]}, "display": {"tone_map": "none", "exposure": -1.0} | display}
+        look = {"display": {"tone_map": "none", "exposure": -1.0} | display}
         request = {"bake": baked.bake, "view": "front", "looks": [look], "format": "png"}
         url = client.post("/api/renders", json=request).headers["location"]
         assert wait_until(client, url, is_done)["state"] == "ready"
@@ -39,22 +39,29 @@ def render(client: TestClient, baked: Baked) -> Render:
 
 
 def test_a_lut_is_listed_and_its_table_has_its_own_size(client: TestClient) -> None:
-    body = upload(client, SWAPPED)
-    assert (body["name"], body["size"], body["lut"], body["warnings"]) == ("swap", 2, f"lut:{body['id']}", [])
+    body = upload(client, GRADE)
+    assert (body["name"], body["size"], body["lut"], body["warnings"]) == ("grade", 2, f"lut:{body['id']}", [])
     assert client.get("/api/luts").json() == [body] == [client.get(f"/api/luts/{body['id']}").json()]
-    table = np.frombuffer(client.get(f"/api/luts/{body['id']}/table").content, "<u2").reshape(2, 2, 2, 3)
-    np.testing.assert_array_equal(table[1, 0, 0], [0, 0, 65535])  # red to blue
+    answer = client.get(f"/api/luts/{body['id']}/table")
+    assert answer.status_code == 200, answer.text
+    table = np.frombuffer(answer.content, "<u2").reshape(2, 2, 2, 3)
+    np.testing.assert_array_equal(table[0, 1, 1], [65535, 65535, 32768])
+    np.testing.assert_array_equal(table[1, 0, 0], [0, 0, 0])
 
 
 def test_renders_have_the_white_balance_and_the_lut(client: TestClient, render: Render) -> None:
-    plain, lut = render({}), upload(client, SWAPPED)["lut"]
-    assert np.ptp(plain, axis=-1).max() > 30
-    np.testing.assert_allclose(render({"lut": lut}), plain[..., ::-1], atol=1)
-    linear = np.where(plain <= 10.31, plain / 255 / 12.92, ((plain / 255 + 0.055) / 1.055) ** 2.4)
-    expected = np.clip(linear @ balance_matrix(5200.0, 10.0).T, 0, 1)
+    plain, lut = render({}) / 255, upload(client, GRADE)["lut"]
+    assert 0.3 < plain.min() <= plain.max() < 0.8
+    graded = np.stack([1 - plain[..., 0], plain[..., 1], plain[..., 2] / 2], axis=-1)
+    np.testing.assert_allclose(render({"lut": lut}) / 255, graded, atol=1.01 / 255)
+    expected = np.clip(decoded(plain) @ balance_matrix(5200.0, 10.0).T, 0, 1)
+    assert np.ptp(expected, axis=-1).min() > 0.1
     balanced = render({"temperature": 5200.0, "tint": 10.0}) / 255
-    decoded = np.where(balanced <= 0.04045, balanced / 12.92, ((balanced + 0.055) / 1.055) ** 2.4)
-    np.testing.assert_allclose(decoded, expected, atol=0.012)  # two roundings to 8 bits
+    np.testing.assert_allclose(decoded(balanced), expected, atol=0.01)  # two roundings to 8 bits
+
+
+def decoded(display: np.ndarray) -> np.ndarray:
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +78,9 @@ def test_renders_have_the_white_balance_and_the_lut(client: TestClient, render: 
 def test_invalid_settings_are_rejected_where_they_are(
     client: TestClient, baked: Baked, display: dict[str, object], pointer: str
 ) -> None:
-    response = client.post("/api/renders", json={"bake": baked.bake, "view": "front", "looks": [{"display": display}]})
+    response = client.post(
+        "/api/renders", json={"bake": baked.bake, "view": "front", "looks": [{"display": display}], "format": "png"}
+    )
     assert response.status_code == 422
     assert pointer in response.text
 
@@ -79,7 +88,7 @@ def test_invalid_settings_are_rejected_where_they_are(
 def test_unusable_files_are_rejected_and_used_luts_are_not_deleted(client: TestClient) -> None:
     response = client.post("/api/luts", files={"lut": ("a.cube", b"LUT_3D_SIZE 256\n0 0 0\n")})
     assert (response.status_code, response.json()["detail"].count("from 2 to 65")) == (422, 1)
-    body = upload(client, SWAPPED)
+    body = upload(client, GRADE)
     saved = {"display": {"lut": body["lut"]}}
     assert client.put("/api/looks/graded", json=saved, headers={"If-None-Match": "*"}).status_code == 201
     refused = client.delete(f"/api/luts/{body['id']}")

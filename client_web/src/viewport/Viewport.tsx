@@ -6,6 +6,7 @@ import { shownViews, activeView } from "../state/views";
 import { Toasts } from "../ui/toasts";
 import { ViewCell } from "./ViewCell";
 import { FalseColorLegend } from "./FalseColorLegend";
+import { AreaReadout } from "./AreaProbe";
 import { HistogramView } from "./HistogramView";
 import { FilterBadge } from "./FilterBadge";
 import { ViewportBar } from "./ViewportBar";
@@ -45,6 +46,7 @@ export function Viewport() {
         </div>
         <PlacementBar />
         <FilterBadge />
+        <AreaReadout />
         <HistogramView />
         <Toasts />
       </div>

@@ -3,12 +3,14 @@ import { toDisplay } from "../render/color/tonemap";
 import { stage } from "../render/renderStage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";
 import { displayTransform } from "../state/color";
+import { isAreaProbeOn } from "../state/areaProbe";
 import { openComments } from "../state/comments";
 import { displayedFrames, falseColor } from "../state/display";
 import { histogramOpen } from "../state/panels";
 import { pixelProbe } from "../state/pointerPixel";
 import { shownPanels, togglePanel } from "../state/panelWidths";
 import { formatNumber } from "../ui/scale";
+import { toggleAreaProbe } from "./AreaProbe";
 
 function PixelProbe() {
   void displayedFrames.value;
@@ -53,11 +55,18 @@ export function ViewportBar() {
         Comments{openComments.value.length > 0 && <span class="count">{openComments.value.length}</span>}
       </button>
       <button
+        aria-pressed={isAreaProbeOn.value}
+        title="Mean, minimum and maximum of a rectangle; drag it in the picture (R)"
+        onClick={toggleAreaProbe}
+      >
+        Area
+      </button>
+      <button
         aria-pressed={histogramOpen.value}
-        title="Brightness distribution (H)"
+        title="Histogram, waveform or RGB parade (H)"
         onClick={() => (histogramOpen.value = !histogramOpen.value)}
       >
-        Histogram
+        Scopes
       </button>
       <button
         aria-pressed={falseColor.value}

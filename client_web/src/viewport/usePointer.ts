@@ -12,6 +12,7 @@ import { pickMaterial } from "../render/materialPicking";
 import type { ImageCanvas } from "../render/canvas";
 import { panTransform, zoomAt } from "../render/zoomTransform";
 import { setTransform, transformOf } from "../render/viewTransforms";
+import { areaBetween, isAreaProbeOn, probedArea } from "../state/areaProbe";
 import { isPickingGray } from "../state/display";
 import { pendingPin } from "../state/comments";
 import { hoveredMaterial, selectMaterial } from "../state/selection";
@@ -56,7 +57,14 @@ function pinchCamera(screen: ImageCanvas, view: string, { across, down, center, 
 /** `isRightHeld`: set while the right button is held. */
 export function useViewPointer(screen: ImageCanvas | null, view: string, isRightHeld: { current: boolean }) {
   const drag = useRef({ x: 0, y: 0, moved: false });
+  const areaStart = useRef<[number, number] | null>(null);
   const begin = (event: PointerEvent) => {
+    areaStart.current = null;
+    if (isAreaProbeOn.peek() && event.button === 0 && screen !== null) {
+      const { px, py } = pickMaterial(screen, event);
+      areaStart.current = [px, py];
+      return true;
+    }
     drag.current = { x: event.clientX, y: event.clientY, moved: false };
     const freeCamera = freeCameraOf(view);
     void freeCamera?.grab();
@@ -66,6 +74,12 @@ export function useViewPointer(screen: ImageCanvas | null, view: string, isRight
   const move = (event: PointerEvent) => {
     if (screen === null) return;
     hoveredView.value = view;
+    if (areaStart.current !== null) {
+      const { px, py } = pickMaterial(screen, event);
+      const { width, height } = screen.image.pixels;
+      probedArea.value = areaBetween(areaStart.current, [px, py], [width, height]);
+      return;
+    }
     const { x, y, moved } = drag.current;
     const [dx, dy] = [event.clientX - x, event.clientY - y];
     if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
