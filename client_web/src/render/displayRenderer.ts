@@ -1,5 +1,6 @@
 /** WebGL2 rendering of the image. All its data is also on the CPU, so a lost context only costs a redraw. */
 import { lutSize, type LutTable } from "./color/lutTable";
+import type { DifferenceMode } from "./color/difference";
 import type { DisplayTransform } from "./color/tonemap";
 import type { Tile } from "../protocol";
 import { allocate, makeTexture, makeVolume, Program } from "./webgl";
@@ -18,6 +19,7 @@ export interface DisplayState {
   display: DisplayTransform;
   falseColor: boolean;
   wipe: number;
+  difference: DifferenceMode;
   hover: number;
   /** Id of the solo material, -1 for none. */
   solo: number;
@@ -145,7 +147,8 @@ export class DisplayRenderer {
       isMinified: state.transform[2] < this.size[0],
       displayReferred: state.displayReferred,
       transparent: state.transparent,
-      compare: state.wipe > 0,
+      compare: state.wipe > 0 || state.difference !== "off",
+      difference: state.difference,
       transparentReference: state.wipe > 0 && state.transparentReference,
       brush: state.brush,
       outline: state.hover >= 0,

@@ -3,7 +3,9 @@
  * Unused features are not compiled in: a software rasterizer pays for branches not taken, and the plain image is three
  * times as fast without them. */
 
-import { LUT_GAIN, LUT_SIZE } from "../protocol";
+import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
+import { BLACK, LMS_TO_ITP, PQ, RANGES, RGB_TO_LMS, SCALES, type DifferenceMode } from "./color/difference";
+import type { Matrix } from "./color/whiteBalance";
 
 /** Features of a shader variant, compiled when first needed. */
 export interface DisplayFeatures {
@@ -18,6 +20,8 @@ export interface DisplayFeatures {
   /** The image has transparent parts, shown over a checkerboard. */
   transparent: boolean;
   compare: boolean;
+  /** Show the difference from the A side. */
+  difference: DifferenceMode;
   /** The same for the A side. */
   transparentReference: boolean;
   brush: boolean;
@@ -48,6 +52,8 @@ export function fragmentShader(features: DisplayFeatures): string {
     features.displayReferred && "DISPLAY_REFERRED",
     features.transparent && "TRANSPARENT",
     features.compare && "COMPARE",
+    features.difference === "stops" && "DIFFERENCE_STOPS",
+    features.difference === "delta_e" && "DIFFERENCE_DELTA_E",
     features.transparentReference && "TRANSPARENT_REFERENCE",
     features.brush && "BRUSH",
     features.outline && "OUTLINE",
@@ -57,6 +63,36 @@ export function fragmentShader(features: DisplayFeatures): string {
   const table = [`#define GAIN ${LUT_GAIN.toFixed(1)}`, `#define LAST ${(LUT_SIZE - 1).toFixed(1)}`];
   return ["#version 300 es", ...lines, ...table, FRAGMENT_BODY].join("\n");
 }
+
+const vec3Text = (color: Rgb): string => `vec3(${color.map((v) => v.toFixed(8)).join(", ")})`;
+/** GLSL's constructor takes columns. */
+const mat3Text = (matrix: Matrix): string => `transpose(mat3(${matrix.map(vec3Text).join(", ")}))`;
+
+/** See `color/difference.ts`. */
+const DIFFERENCE = `
+#ifdef DIFFERENCE_STOPS
+vec3 differenceColor(vec3 a, vec3 b) {
+  const vec3 weights = vec3(0.2126, 0.7152, 0.0722);
+  float levelA = max(dot(uDisplayMatrix * a, weights), 0.0) + ${BLACK}, levelB = max(dot(uDisplayMatrix * b, weights), 0.0) + ${BLACK};
+  float t = clamp(log2(levelA / levelB) / ${RANGES.stops.toFixed(1)}, -1.0, 1.0);
+  return mix(${vec3Text(SCALES.stops[1])}, t < 0.0 ? ${vec3Text(SCALES.stops[0])} : ${vec3Text(SCALES.stops[2])}, abs(t));
+}
+#endif
+
+#ifdef DIFFERENCE_DELTA_E
+vec3 itp(vec3 x) {
+  vec3 linear = mix(x / 12.92, pow((x + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), x));
+  vec3 power = pow(max(${mat3Text(RGB_TO_LMS)} * linear, 0.0) / 100.0, vec3(${PQ.m1}));
+  return ${mat3Text(LMS_TO_ITP)} * pow((${PQ.c1} + ${PQ.c2} * power) / (1.0 + ${PQ.c3} * power), vec3(${PQ.m2}));
+}
+
+vec3 differenceColor(vec3 a, vec3 b) {
+  float t = clamp(720.0 * distance(itp(display(a)), itp(display(b))) / ${RANGES.delta_e.toFixed(1)}, 0.0, 1.0);
+  return t < 0.5 ? mix(${vec3Text(SCALES.delta_e[0])}, ${vec3Text(SCALES.delta_e[1])}, 2.0 * t)
+    : mix(${vec3Text(SCALES.delta_e[1])}, ${vec3Text(SCALES.delta_e[2])}, 2.0 * t - 1.0);
+}
+#endif
+`;
 
 const FRAGMENT_BODY = `precision highp float;
 precision highp usampler2D;
@@ -220,6 +256,7 @@ vec3 displayed(vec2 uv, bool reference) {
 #endif
 }
 
+${DIFFERENCE}
 int idAt(vec2 uv) {
   ivec2 p = clamp(ivec2(uv * uSize), ivec2(0), ivec2(uSize) - 1);
   return int(texelFetch(uIds, p, 0).r);
@@ -246,7 +283,9 @@ void main() {
 #ifdef COMPARE
   reference = uv.x < uWipe;
 #endif
-#ifdef DISPLAY_REFERRED
+#if defined(DIFFERENCE_STOPS) || defined(DIFFERENCE_DELTA_E)
+  vec3 color = differenceColor(filtered(uv, true).rgb, filtered(uv, false).rgb);
+#elif defined(DISPLAY_REFERRED)
   vec3 color = reference ? displayed(uv, true) : texture(uDisplay, uv).rgb;
 #ifdef TRANSPARENT
   if (!reference) color += (1.0 - filtered(uv, false).a) * checkerboard();

@@ -10,6 +10,7 @@ import { displayTransform } from "../state/color";
 import { displayedFrames } from "../state/display";
 import { mayEdit } from "../state/sessionUser";
 import { formatNumber } from "../ui/scale";
+import { useIdleFrame } from "./useIdleFrame";
 import type { Rgb } from "../protocol";
 
 const LARGE_STEP = 10;
@@ -103,7 +104,7 @@ const areaText = ({ x, y, width, height }: Area): string => `${width} × ${heigh
 
 /** The statistics of the active view. */
 export function AreaReadout() {
-  void displayedFrames.value;
+  void useIdleFrame();
   const area = probedArea.value;
   if (!isAreaProbeOn.value || area === null) return null;
   const { hasPixels, pixels } = stage.active;

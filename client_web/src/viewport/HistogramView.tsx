@@ -1,15 +1,15 @@
 /** Histogram, waveform or RGB parade of the displayed image, computed when input pauses. */
-import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useMemo, useRef } from "preact/hooks";
 import { computeHistogram, MAX_STOP, MIN_STOP, NUM_BINS, percentile, type Histogram } from "../render/histogram";
 import { stage } from "../render/renderStage";
 import { computeWaveform, summarizeWaveform, type Waveform } from "../render/waveform";
 import { bake } from "../state/bakes";
 import { displayTransform } from "../state/color";
-import { displayedFrames } from "../state/display";
 import { isFrameExact } from "../state/fidelity";
 import { histogramOpen, scope, type Scope } from "../state/panels";
 import { RadioRow, type RadioOption } from "../ui/RadioRow";
 import { paintWaveform } from "./paintWaveform";
+import { useIdleFrame } from "./useIdleFrame";
 
 const WIDTH = 252;
 const HEIGHT = 84;
@@ -65,7 +65,6 @@ function paintHistogram(canvas: HTMLCanvasElement, histogram: Histogram): void {
   }
 }
 
-const IDLE_MS = 250; // after the last frame
 /** Columns of the waveform, and of each channel of the parade. */
 const WAVEFORM_COLUMNS = { waveform: WIDTH / 2, parade: WIDTH / 3 };
 
@@ -80,12 +79,7 @@ type Scoped =
 
 /** The scope's values once frames pause, and whether the image was exact. */
 function useScope(scope: Scope): { values: Scoped; isExact: boolean } | null {
-  const [idleFrame, setIdleFrame] = useState(-1);
-  const frame = displayedFrames.value;
-  useEffect(() => {
-    const timer = setTimeout(() => setIdleFrame(frame), IDLE_MS);
-    return () => clearTimeout(timer);
-  }, [frame]);
+  const idleFrame = useIdleFrame();
   void bake.value; // another scene may have a view of the same name
   const [image, transform, isExact] = [stage.active, displayTransform.value, isFrameExact.value];
   return useMemo(() => {

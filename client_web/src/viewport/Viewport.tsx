@@ -5,6 +5,7 @@ import { PlacementBar } from "../panels/lights/PlacementBar";
 import { shownViews, activeView } from "../state/views";
 import { Toasts } from "../ui/toasts";
 import { ViewCell } from "./ViewCell";
+import { DifferenceLegend } from "./DifferenceLegend";
 import { FalseColorLegend } from "./FalseColorLegend";
 import { AreaReadout } from "./AreaProbe";
 import { HistogramView } from "./HistogramView";
@@ -51,6 +52,7 @@ export function Viewport() {
         <Toasts />
       </div>
       <CameraBar />
+      <DifferenceLegend />
       <FalseColorLegend />
       <ViewportBar />
     </main>
