@@ -33,7 +33,10 @@ describe("histogram", () => {
 
   test("a stop of exposure moves everything by a stop", () => {
     const encoded = Uint32Array.from({ length: 500 }, (_, i) => encodeRgb9e5(0.02 + i / 300, 0.1, 0.3));
-    const [before, after] = [computeHistogram(encoded, displayMatrix(0, 6500, 0)), computeHistogram(encoded, displayMatrix(1, 6500, 0))];
+    const [before, after] = [
+      computeHistogram(encoded, displayMatrix(0, 6500, 0)),
+      computeHistogram(encoded, displayMatrix(1, 6500, 0)),
+    ];
     expect([...after.luminance.subarray(BINS_PER_STOP)]).toEqual([
       ...before.luminance.subarray(0, NUM_BINS - BINS_PER_STOP),
     ]);

@@ -1,7 +1,8 @@
-/** White balance and the display LUT of the look. */
+/** White balance and the display LUT of the look, and the difference of A and B. */
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { editValue } from "../edit/edit";
 import { DEFAULTS, RANGES } from "../look.gen";
+import { sideA } from "../panels/looks/abCompare";
 import {
   chooseLut,
   currentLut,
@@ -12,7 +13,8 @@ import {
   LUT_SUFFIX,
   offerToDeleteLut,
 } from "../panels/looks/displayLuts";
-import { isPickingGray } from "../state/display";
+import type { DifferenceMode } from "../render/color/difference";
+import { difference, isPickingGray } from "../state/display";
 import { look } from "../state/look";
 import { LabeledSlider } from "../ui/LabeledSlider";
 import { useDismiss } from "../ui/useDismiss";
@@ -96,6 +98,24 @@ function LutSelect() {
   );
 }
 
+function DifferenceSelect() {
+  return (
+    <label>
+      Difference
+      <select
+        title="Show the difference between A and B (live) in place of the picture"
+        disabled={sideA.value === null}
+        value={difference.value}
+        onChange={(event) => (difference.value = event.currentTarget.value as DifferenceMode)}
+      >
+        <option value="off">Off</option>
+        <option value="stops">A − B in stops</option>
+        <option value="delta_e">A − B as ΔE ITP</option>
+      </select>
+    </label>
+  );
+}
+
 export function DisplayMenu() {
   const [open, setOpen] = useState(false);
   const menu = useRef<HTMLDivElement>(null);
@@ -110,18 +130,14 @@ export function DisplayMenu() {
   };
   return (
     <div class="menu" ref={menu} onKeyDown={onEscape}>
-      <button
-        aria-label="White balance and LUT"
-        title="White balance and LUT"
-        aria-expanded={open}
-        onClick={() => setOpen(!open)}
-      >
+      <button aria-label="Display options" title="Display options" aria-expanded={open} onClick={() => setOpen(!open)}>
         ▾
       </button>
       {open && (
-        <div class="menu-body display-menu" role="group" aria-label="White balance and LUT">
+        <div class="menu-body display-menu" role="group" aria-label="Display options">
           <WhiteBalance />
           <LutSelect />
+          <DifferenceSelect />
         </div>
       )}
     </div>

@@ -1,7 +1,6 @@
 /** The top bar: scene, views, undo, comparison, display, export. */
 import { Account } from "./account/Account";
 import { TONE_MAPS } from "../render/color/tonemap";
-import type { DifferenceMode } from "../render/color/difference";
 import { editValue } from "../edit/edit";
 import { history } from "../edit/history";
 import { storeA, sideA, swapWithA, toggleWipe } from "../panels/looks/abCompare";
@@ -9,7 +8,7 @@ import { redo, undo } from "../panels/looks/undoRedo";
 import type { Look } from "../protocol";
 import { closeScene } from "../session/scene/openScene";
 import { colorConfig, parseToneMapKey, hasOcioView, toneMapKey } from "../state/color";
-import { difference, isReferenceShown, wipe } from "../state/display";
+import { isReferenceShown, wipe } from "../state/display";
 import { look } from "../state/look";
 import { mayEdit } from "../state/sessionUser";
 import { filmstripOpen, helpOpen } from "../state/panels";
@@ -84,17 +83,6 @@ function CompareButtons() {
       >
         Show A
       </button>
-      <select
-        aria-label="Difference"
-        title="Difference between A and B (live)"
-        disabled={hasNoReference}
-        value={difference.value}
-        onChange={(event) => (difference.value = event.currentTarget.value as DifferenceMode)}
-      >
-        <option value="off">A − B</option>
-        <option value="stops">Stops</option>
-        <option value="delta_e">ΔE ITP</option>
-      </select>
       <button title="Swap A and B (X)" disabled={hasNoReference} onClick={swapWithA}>
         Swap
       </button>

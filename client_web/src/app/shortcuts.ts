@@ -56,7 +56,12 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Actual size", keys: ["1"], run: zoomActual },
   { group: "Picture", label: "Views side by side", keys: ["v"], run: toggleSideBySide },
   { group: "Picture", label: "Exposure heat map", keys: ["e"], run: () => (falseColor.value = !falseColor.value) },
-  { group: "Picture", label: "Histogram, waveform, parade", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
+  {
+    group: "Picture",
+    label: "Histogram, waveform, parade",
+    keys: ["h"],
+    run: () => (histogramOpen.value = !histogramOpen.value),
+  },
   { group: "Picture", label: "Area probe", keys: ["r"], run: toggleAreaProbe },
   { group: "Picture", label: "Solo selection", keys: ["s"], run: toggleSolo },
   { group: "Picture", label: "Light handles", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },

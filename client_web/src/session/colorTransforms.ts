@@ -3,7 +3,16 @@ import { computed, effect } from "@preact/signals";
 import { parseLut, type LutTable } from "../render/color/lutTable";
 import { getColor, getLut, getLutTable } from "./net/api";
 import type { Look } from "../protocol";
-import { colorConfig, hasOcioView, toneMapKey, lutFor, lutTables, displayLut, displayLutFor, toneMap } from "../state/color";
+import {
+  colorConfig,
+  hasOcioView,
+  toneMapKey,
+  lutFor,
+  lutTables,
+  displayLut,
+  displayLutFor,
+  toneMap,
+} from "../state/color";
 import { look } from "../state/look";
 import { reportErrors } from "../ui/toasts";
 
@@ -52,6 +61,7 @@ export function trackToneMap(): void {
   });
   effect(() => {
     const [requested, config] = [targetToneMap.value, colorConfig.value?.id ?? null];
-    if (typeof requested !== "string" && config !== null && hasOcioView(requested)) void fetchTable(toneMapKey(requested), () => getLut(config, requested));
+    if (typeof requested !== "string" && config !== null && hasOcioView(requested))
+      void fetchTable(toneMapKey(requested), () => getLut(config, requested));
   });
 }

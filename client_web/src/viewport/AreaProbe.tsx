@@ -114,7 +114,10 @@ export function AreaReadout() {
       <p role="status">{statistics === null ? "Outside the picture" : areaText(area)}</p>
       {statistics !== null && <StatisticsTable {...statistics} />}
       {statistics !== null && mayEdit.value && (
-        <button title="Set the white balance so that the mean is gray" onClick={() => makeGray(statistics.radiance.mean)}>
+        <button
+          title="Set the white balance so that the mean is gray"
+          onClick={() => makeGray(statistics.radiance.mean)}
+        >
           Make gray
         </button>
       )}

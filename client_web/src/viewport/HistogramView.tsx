@@ -74,8 +74,7 @@ const SCOPES: readonly RadioOption<Scope>[] = [
   { value: "parade", label: "Parade", title: "Red, green and blue of display values, by column of the image" },
 ];
 
-type Scoped =
-  { scope: "histogram"; histogram: Histogram } | { scope: "waveform" | "parade"; waveform: Waveform };
+type Scoped = { scope: "histogram"; histogram: Histogram } | { scope: "waveform" | "parade"; waveform: Waveform };
 
 /** The scope's values once frames pause, and whether the image was exact. */
 function useScope(scope: Scope): { values: Scoped; isExact: boolean } | null {
@@ -113,9 +112,7 @@ function Scopes() {
   const summary = (values: Scoped) =>
     values.scope === "histogram" ? summarize(values.histogram) : summarizeWaveform(values.waveform);
   const text =
-    scoped === null
-      ? "Waiting for the picture…"
-      : `${scoped.isExact ? "" : "Approximate: "}${summary(scoped.values)}`;
+    scoped === null ? "Waiting for the picture…" : `${scoped.isExact ? "" : "Approximate: "}${summary(scoped.values)}`;
   return (
     <figure class="histogram" aria-label={LABELS[scope.value]}>
       <RadioRow label="Scope" choices={SCOPES} selected={scope.value} onSelect={(value) => (scope.value = value)} />

@@ -33,7 +33,12 @@ function drawTrace(ctx: CanvasRenderingContext2D, image: ImageData, left: number
 }
 
 /** Paint luma, or red, green and blue beside each other. */
-export function paintWaveform(canvas: HTMLCanvasElement, waveform: Waveform, isParade: boolean, size: [number, number]) {
+export function paintWaveform(
+  canvas: HTMLCanvasElement,
+  waveform: Waveform,
+  isParade: boolean,
+  size: [number, number],
+) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = size;
   [canvas.width, canvas.height] = [width * ratio, height * ratio];

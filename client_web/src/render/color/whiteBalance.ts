@@ -98,11 +98,7 @@ export function balanceForGray(color: Rgb): { temperature: number; tint: number 
   const cones = transformColor(RGB_TO_CONES, color);
   if (!(Math.min(...cones) > 0)) return null;
   const neutral = ratio(whiteCones(NEUTRAL_KELVIN, 0), transformColor(RGB_TO_CONES, [1, 1, 1]));
-  const [X, Y, Z] = transformColor(CONES_TO_XYZ, [
-    cones[0] * neutral[0],
-    cones[1] * neutral[1],
-    cones[2] * neutral[2],
-  ]);
+  const [X, Y, Z] = transformColor(CONES_TO_XYZ, [cones[0] * neutral[0], cones[1] * neutral[1], cones[2] * neutral[2]]);
   const sum = X + 15 * Y + 3 * Z;
   const [u, v] = [(4 * X) / sum, (6 * Y) / sum];
   const temperature = Math.round(nearestKelvin(u, v));
