@@ -1,6 +1,7 @@
 /** Differences of two images: values of BT.2124, signs, and summaries. */
 import { expect, test } from "vitest";
-import { deltaE, stopsBetween, summarizeDifference } from "../src/render/color/difference";
+import { deltaE, stopsBetween } from "../src/render/color/difference";
+import { summarizeDifference } from "../src/render/differenceSummary";
 import { encodeRgb9e5 } from "../src/render/color/rgb9e5";
 import { displayMatrix } from "../src/render/color/whiteBalance";
 import { fragmentShader } from "../src/render/displayShaders";

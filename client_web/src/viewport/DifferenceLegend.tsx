@@ -1,6 +1,7 @@
 /** Legend of the difference A − B: its scale, mean and maximum. */
 import { useMemo } from "preact/hooks";
-import { RANGES, SCALES, summarizeDifference, type DifferenceSummary } from "../render/color/difference";
+import { RANGES, SCALES } from "../render/color/difference";
+import { summarizeDifference, type DifferenceSummary } from "../render/differenceSummary";
 import { stage } from "../render/renderStage";
 import type { Rgb } from "../protocol";
 import { displayTransform } from "../state/color";

@@ -3,10 +3,8 @@
  * ΔE ITP (ITU-R BT.2124): 720 times the distance in I, T = C_T / 2, P = C_P of IC_TC_P (BT.2100), of display values with
  * white at 100 cd/m²; 1 is about just noticeable. */
 import type { Rgb } from "../../protocol";
-import { decodeRgb9e5 } from "./rgb9e5";
 import { luminance, srgbDecode, toDisplay, type DisplayTransform } from "./tonemap";
 import { transformColor, type Matrix } from "./whiteBalance";
-import type { PixelBuffer } from "../pixels";
 
 export const DIFFERENCE_MODES = ["off", "stops", "delta_e"] as const;
 export type DifferenceMode = (typeof DIFFERENCE_MODES)[number];
@@ -64,36 +62,4 @@ export function deltaE(a: Rgb, b: Rgb): number {
 export function stopsBetween(a: Rgb, b: Rgb, { matrix }: DisplayTransform): number {
   const level = (radiance: Rgb) => Math.max(0, luminance(transformColor(matrix, radiance))) + BLACK;
   return Math.log2(level(a) / level(b));
-}
-
-export interface DifferenceSummary {
-  mean: number;
-  /** Of the largest magnitude, with its sign. */
-  maximum: number;
-  /** Every so many pixels were read. */
-  step: number;
-}
-
-const MAX_SAMPLES = 50_000;
-
-/** Mean and maximum of a difference A − B; null for images of different sizes. */
-export function summarizeDifference(
-  a: PixelBuffer,
-  b: PixelBuffer,
-  transform: DisplayTransform,
-  mode: "stops" | "delta_e",
-): DifferenceSummary | null {
-  if (a.width !== b.width || a.height !== b.height) return null;
-  // an odd step avoids aliasing with the image's columns
-  const step = a.encoded.length > MAX_SAMPLES ? Math.ceil(a.encoded.length / MAX_SAMPLES) | 1 : 1;
-  let [sum, maximum, count] = [0, 0, 0];
-  for (let i = 0; i < a.encoded.length; i += step) {
-    const [x, y] = [decodeRgb9e5(a.encoded[i] as number), decodeRgb9e5(b.encoded[i] as number)];
-    const difference =
-      mode === "stops" ? stopsBetween(x, y, transform) : deltaE(toDisplay(x, transform), toDisplay(y, transform));
-    sum += difference;
-    count += 1;
-    if (Math.abs(difference) > Math.abs(maximum)) maximum = difference;
-  }
-  return { mean: sum / count, maximum, step };
 }
