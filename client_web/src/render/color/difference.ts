@@ -3,7 +3,7 @@
  * ΔE ITP (ITU-R BT.2124): 720 times the distance in I, T = C_T / 2, P = C_P of IC_TC_P (BT.2100), of display values with
  * white at 100 cd/m²; 1 is about just noticeable. */
 import type { Rgb } from "../../protocol";
-import { luminance, srgbDecode, toDisplay, type DisplayTransform } from "./tonemap";
+import { luminance, srgbDecode, type DisplayTransform } from "./tonemap";
 import { transformColor, type Matrix } from "./whiteBalance";
 
 export const DIFFERENCE_MODES = ["off", "stops", "delta_e"] as const;
