@@ -38,7 +38,8 @@ def to_display(
     """Convert linear radiance to display values in [0, 1].
 
     Args:
-        image: linear Rec. 709; negative values and NaN become black. use_table: as in `tone_map`.
+        image: linear Rec. 709; negative values and NaN become black. transform: the settings.
+        use_table: as in `tone_map`.
     Raises:
         ParameterError, ShapeMismatchError: as `tone_map` does.
     """
