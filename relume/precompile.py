@@ -31,7 +31,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
 from relume.core.cache import Cache
 from relume.image_io.ocio import lut
-from relume.image_io.ocio.sampling import apply_lut
+from relume.image_io.ocio.sampling import apply_display_lut, apply_lut
 from relume.image_io.tone_mapping import tone_map
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
@@ -138,7 +138,9 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
             picture.prepare(f"/materials/{material}/terms/0/params/{parameter.name}")
             _render(picture)
     tone_map(picture.image(), 0.0, "agx")
-    apply_lut(np.zeros((lut.SIZE, lut.SIZE, lut.SIZE, 3), np.uint16), np.zeros((1, 3), np.float32))
+    table = np.zeros((lut.SIZE, lut.SIZE, lut.SIZE, 3), np.uint16)
+    for apply in (apply_lut, apply_display_lut):
+        apply(table, np.zeros((1, 3), np.float32))
 
 
 def _polish(transfer: FixedViewTransfer | BakedFreeCamera, picture: Picture | FreeCameraPicture) -> None:

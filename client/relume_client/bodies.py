@@ -175,10 +175,14 @@ class DiscLook(TypedDict):
 
 
 class DisplayLook(TypedDict):
-    """Conversion from radiance to display: `exposure` in stops, then the tone map or an OpenColorIO view."""
+    """Conversion from radiance to display: white balance, `exposure` in stops, then the tone map or an OpenColorIO
+    view, then a LUT of display values."""
 
     exposure: NotRequired[float]
     tone_map: NotRequired[Literal["agx", "filmic", "none"] | OcioView]
+    temperature: NotRequired[float]
+    tint: NotRequired[float]
+    lut: NotRequired[str | None]
 
 
 class DrainMessage(TypedDict):

@@ -765,6 +765,16 @@ export interface LooksBody {
   crosses: string | null;
 }
 
+/** A LUT of display values for looks, as their `display.lut`. `size`: nodes per channel of its table. `warnings`: changes made when its file was read. */
+export interface LutBody {
+  id: string;
+  lut: string;
+  name: string;
+  created: string;
+  size: number;
+  warnings: string[];
+}
+
 /** A material in the plane of reflectance at normal incidence and roughness; `id` is that of its library entry. */
 export interface MapPoint {
   id: string;

@@ -33,6 +33,7 @@ export type {
   LookEntry,
   LookView,
   LooksBody,
+  LutBody,
   MaterialMapBody,
   MeBody,
   OpenMessage,

@@ -1,7 +1,8 @@
 import { describe, expect, test } from "vitest";
 import { luminance } from "../src/render/color/tonemap";
 import { emissionForWatts, LUMENS_PER_WATT, unitsOf, wattsOf } from "../src/panels/lights/power";
-import { withKelvin, kelvinOf, planckian, rgbOfKelvin } from "../src/panels/lights/temperature";
+import { planckian } from "../src/render/color/planckian";
+import { withKelvin, kelvinOf, rgbOfKelvin } from "../src/panels/lights/temperature";
 import type { Light } from "../src/protocol";
 
 const common = { intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1] } as const;

@@ -1,4 +1,5 @@
 /** A small look for tests. */
+import { DEFAULTS } from "../src/look.gen";
 import { changeValue } from "../src/state/document/jsonPatch";
 import type { Look } from "../src/protocol";
 
@@ -17,7 +18,7 @@ export const LOOK: Look = {
   lights: {},
   light_groups: {},
   transport: { show: "all", bounces: 24 },
-  display: { exposure: 0, tone_map: "agx" },
+  display: DEFAULTS.display,
 };
 
 /** A look with another value at a pointer. */

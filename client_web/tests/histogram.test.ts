@@ -1,4 +1,5 @@
 import { describe, expect, test } from "vitest";
+import { displayMatrix } from "../src/render/color/whiteBalance";
 import { encodeRgb9e5 } from "../src/render/color/rgb9e5";
 import {
   BINS_PER_STOP,
@@ -23,7 +24,7 @@ describe("histogram", () => {
 
   test("channels and luminance are counted apart", () => {
     const encoded = new Uint32Array(10).fill(encodeRgb9e5(0.5, 0, 0));
-    const { luminance, channels, samples } = computeHistogram(encoded, 0);
+    const { luminance, channels, samples } = computeHistogram(encoded, displayMatrix(0, 6500, 0));
     expect(samples).toBe(10);
     expect(luminance[binIndex(0.5 * 0.2126)]).toBe(10);
     expect(channels[0][binIndex(0.5)]).toBe(10);
@@ -32,7 +33,10 @@ describe("histogram", () => {
 
   test("a stop of exposure moves everything by a stop", () => {
     const encoded = Uint32Array.from({ length: 500 }, (_, i) => encodeRgb9e5(0.02 + i / 300, 0.1, 0.3));
-    const [before, after] = [computeHistogram(encoded, 0), computeHistogram(encoded, 1)];
+    const [before, after] = [
+      computeHistogram(encoded, displayMatrix(0, 6500, 0)),
+      computeHistogram(encoded, displayMatrix(1, 6500, 0)),
+    ];
     expect([...after.luminance.subarray(BINS_PER_STOP)]).toEqual([
       ...before.luminance.subarray(0, NUM_BINS - BINS_PER_STOP),
     ]);
@@ -40,7 +44,7 @@ describe("histogram", () => {
 
   test("a large picture is sampled, every sample is counted once in each channel", () => {
     const encoded = Uint32Array.from({ length: 1_000_000 }, (_, i) => encodeRgb9e5(i % 640 < 320 ? 0.05 : 1, 0.2, 0.2));
-    const { luminance, channels, samples } = computeHistogram(encoded, 0);
+    const { luminance, channels, samples } = computeHistogram(encoded, displayMatrix(0, 6500, 0));
     expect(samples).toBeLessThanOrEqual(60_000);
     for (const bins of [luminance, ...channels]) expect(total(bins)).toBe(samples);
     expect((channels[0][binIndex(1)] as number) / samples).toBeCloseTo(0.5, 2);
@@ -50,7 +54,7 @@ describe("histogram", () => {
     const encoded = Uint32Array.from({ length: 100 }, (_, i) =>
       encodeRgb9e5(...gray(i < 50 ? MIDDLE_GRAY : 4 * MIDDLE_GRAY)),
     );
-    const histogram = computeHistogram(encoded, 0.01);
+    const histogram = computeHistogram(encoded, displayMatrix(0.01, 6500, 0));
     expect(percentile(histogram, 0.25)).toBeCloseTo(0, 0);
     expect(percentile(histogram, 0.75)).toBeCloseTo(2, 0);
   });

@@ -1,6 +1,7 @@
 /** Tables of views, between whose nodes go tetrahedra. */
 import { expect, test } from "vitest";
-import { sampleLut, parseLut } from "../src/render/color/lutTable";
+import { displayMatrix } from "../src/render/color/whiteBalance";
+import { lutSize, sampleDisplayLut, sampleLut, parseLut } from "../src/render/color/lutTable";
 import { toDisplay } from "../src/render/color/tonemap";
 import { LUT_GAIN, LUT_SIZE, type Rgb } from "../src/protocol";
 
@@ -43,6 +44,23 @@ test.each<Rgb>([
 });
 
 test("exposure comes before a view, and what is below nothing is black", () => {
-  expect(toDisplay([0.5, 0.1, 2], 1, MIXED)).toEqual(sampleLut(MIXED, [1, 0.2, 4]));
+  expect(toDisplay([0.5, 0.1, 2], { matrix: displayMatrix(1, 6500, 0), toneMap: MIXED, lut: null })).toEqual(
+    sampleLut(MIXED, [1, 0.2, 4]),
+  );
   expect(sampleLut(MIXED, [-1, -2, -3])).toEqual(sampleLut(MIXED, [0, 0, 0]));
+});
+
+test("a display LUT has its own size, is linear between its nodes, and follows the tone map", () => {
+  // red inverted, green as it is, half the blue; red slowest
+  const corners = [0, 1].flatMap((r) => [0, 1].flatMap((g) => [0, 1].flatMap((b) => [1 - r, g, b / 2])));
+  const table = Float32Array.from(corners);
+  expect(lutSize(table)).toBe(2);
+  const [r, g, b] = sampleDisplayLut(table, [0.2, 0.7, 0.4]);
+  expect([r, g, b].map((v) => Number(v.toFixed(6)))).toEqual([0.8, 0.7, 0.2]);
+  expect(sampleDisplayLut(table, [-1, 2, 1])).toEqual([1, 1, 0.5]);
+  const transform = { matrix: displayMatrix(0, 6500, 0), toneMap: "none", lut: null } as const;
+  const plain = toDisplay([0.1, 0.2, 0.3], transform);
+  toDisplay([0.1, 0.2, 0.3], { ...transform, lut: table }).forEach((v, c) =>
+    expect(v).toBeCloseTo([1 - plain[0], plain[1], plain[2] / 2][c] as number, 6),
+  );
 });

@@ -37,7 +37,9 @@ INTEROP_SPACES: Mapping[str, Chromaticities] = {
 }
 """Common linear spaces, by their ids in files (ASWF Color Interop Forum)."""
 
-_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+"""CIE XYZ to the cone space of Bradford's adaptation (ICC.1, annex E)."""
+
 _MAX_COORDINATE = 2.0  # maximum magnitude of a coordinate; primaries that enclose all colors are within 1.1
 _MIN_WHITE = 0.1  # y of a white
 _MIN_AREA = 0.01  # twice the area of the primaries' triangle; Rec. 709 has 0.22
@@ -63,10 +65,10 @@ def to_rec_709(chromaticities: Sequence[float]) -> Shaped[F64, "3 3"] | None:
         return None
     rec_709_to_xyz = _to_xyz(np.array(REC_709))
     source_to_xyz = _to_xyz(values)
-    source_cones, rec_709_cones = _BRADFORD @ source_to_xyz.sum(axis=1), _BRADFORD @ rec_709_to_xyz.sum(axis=1)
+    source_cones, rec_709_cones = BRADFORD @ source_to_xyz.sum(axis=1), BRADFORD @ rec_709_to_xyz.sum(axis=1)
     if source_cones.min() <= 0:
         raise ValueError("its white is not a color")
-    adapted = np.linalg.solve(_BRADFORD, (rec_709_cones / source_cones)[:, None] * _BRADFORD)
+    adapted = np.linalg.solve(BRADFORD, (rec_709_cones / source_cones)[:, None] * BRADFORD)
     matrix = np.linalg.solve(rec_709_to_xyz, adapted @ source_to_xyz)
     if not np.abs(matrix).max() <= _MAX_GAIN:
         raise ValueError("its primaries are too close together")

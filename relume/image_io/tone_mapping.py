@@ -29,7 +29,7 @@ _AGX, _FILMIC = np.int64(1), np.int64(2)
 _PIXELS_PER_RANGE = 1 << 15
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_MAX_RADIANCE = np.float32(1e9)  # far above white in every tone curve; avoids inf/inf
+MAX_RADIANCE = np.float32(1e9)  # far above white in every tone curve; avoids inf/inf
 AGX_INSET = np.array(
     [
         [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
@@ -81,7 +81,7 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
     for k in range(start, stop):
         for c in range(3):
             v = gain * pixels[k, c]
-            rgb[c] = min(v, _MAX_RADIANCE) if v > _ZERO else _ZERO  # NaN is not above zero
+            rgb[c] = min(v, MAX_RADIANCE) if v > _ZERO else _ZERO  # NaN is not above zero
         if kind == _AGX:
             for c in range(3):
                 out[k, c] = agx_curve(AGX_INSET[c, 0] * rgb[0] + AGX_INSET[c, 1] * rgb[1] + AGX_INSET[c, 2] * rgb[2])
@@ -126,6 +126,6 @@ def _apply_tone_map(pixels: F32, gain: np.float32, name: str) -> F32:
 
 
 def _apply_view(pixels: F32, gain: np.float32, view: OcioView, use_table: bool) -> F32:
-    display = np.clip(np.nan_to_num(gain * pixels, nan=0.0), 0, _MAX_RADIANCE)
+    display = np.clip(np.nan_to_num(gain * pixels, nan=0.0), 0, MAX_RADIANCE)
     require_config().apply_view(display, view, use_table=use_table)
     return np.asarray(np.clip(np.nan_to_num(display, copy=False), 0, 1), np.float32)

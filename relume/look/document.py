@@ -19,12 +19,14 @@ from relume.core.validation import (
     names_text,
 )
 from relume.image_io.ocio.view import MAX_NAME
+from relume.image_io.white_balance import NEUTRAL_TEMPERATURE, TEMPERATURES, TINTS
 from relume.look.glass import complete_glass, default_glass
 from relume.look.light_groups import complete_light_groups, default_light_groups
 from relume.look.light_mix import expand_light_mix
 from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
 from relume.look.link_validation import check_link
 from relume.look.model import BackgroundKind, BasisFunctions, Look, PathFilter, ToneMap
+from relume.luts.lut_store import LUTS
 from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
@@ -34,13 +36,19 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number in a fie
     "environment": {"intensity": (0.0, MAX_INTENSITY), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
     "background": {"color": (0.0, MAX_COLOR), "blur": (2.0, 60.0)},
     "transport": {"bounces": (0, MAX_BOUNCES)},
-    "display": {"exposure": (-20.0, 20.0)},
+    "display": {"exposure": (-20.0, 20.0), "temperature": TEMPERATURES, "tint": TINTS},
 }
 DEFAULTS: dict[str, dict[str, Any]] = {
     "environment": {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0, "link": None},
     "background": {"kind": "map", "color": [0.5, 0.5, 0.5], "blur": 10.0},
     "transport": {"show": "all", "bounces": MAX_BOUNCES},
-    "display": {"exposure": 0.0, "tone_map": "agx"},
+    "display": {
+        "exposure": 0.0,
+        "tone_map": "agx",
+        "temperature": NEUTRAL_TEMPERATURE,
+        "tint": 0.0,
+        "lut": None,
+    },
 }
 _OPTIONAL = {"normal_map": None, "glass": None, "basis_functions": None}  # of materials
 _SECTIONS = tuple(Look.model_fields)
@@ -113,7 +121,7 @@ def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping
             partial.get("light_groups", default_groups), default_groups, previous.get("light_groups", {}), lights
         ),
         "transport": _complete_transport(partial.get("transport", {}), default.get("transport", {})),
-        "display": _complete_display(partial.get("display", {}), default["display"]),
+        "display": _complete_display(partial.get("display", {}), default["display"], previous.get("display", {})),
     }
 
 
@@ -224,11 +232,19 @@ def _complete_transport(partial: Any, default: Mapping[str, Any]) -> dict[str, A
     return fields
 
 
-def _complete_display(partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    fields = _merge(("display",), partial, default)
-    check_number(("display", "exposure"), fields["exposure"], *RANGES["display"]["exposure"])
+def _complete_display(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
+    fields = _merge(("display",), partial, {**DEFAULTS["display"], **default})  # older stores have no white balance
+    for name, allowed in RANGES["display"].items():
+        check_number(("display", name), fields[name], *allowed)
     _check_tone_map(("display", "tone_map"), fields["tone_map"])
+    if fields["lut"] != previous.get("lut"):
+        _check_lut(("display", "lut"), fields["lut"])
     return fields
+
+
+def _check_lut(pointer: Pointer, name: Any) -> None:
+    if name is not None and not (isinstance(name, str) and LUTS.exists(name)):
+        raise invalid_value(pointer, name, f"null, or an uploaded LUT: {names_text(LUTS.list_names())}")
 
 
 def _check_tone_map(pointer: Pointer, value: Any) -> None:

@@ -12,7 +12,9 @@ from pydantic.dataclasses import dataclass
 from typing_extensions import TypedDict  # pydantic requires it before Python 3.12
 
 from relume.brdf.texture_slots import NormalMap
+from relume.image_io.display_transform import DisplayTransform
 from relume.image_io.ocio.view import OcioView
+from relume.luts.lut_store import load_table
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
@@ -397,10 +399,24 @@ class TransportLook(_FrozenModel):
 
 
 class DisplayLook(_FrozenModel):
-    """Conversion from radiance to display: `exposure` in stops, then the tone map or an OpenColorIO view."""
+    """Conversion from radiance to display: white balance, `exposure` in stops, then the tone map or an OpenColorIO
+    view, then a LUT of display values.
+
+    `temperature`: of the light that shows as white, kelvin; 6500 leaves colors unchanged. `tint`: a positive one takes
+    green out. `lut`: "lut:<id>" of an uploaded LUT; null: none.
+    """
 
     exposure: float
     tone_map: ToneMap | OcioView
+    temperature: float
+    tint: float
+    lut: str | None
+
+    @property
+    def transform(self) -> DisplayTransform:
+        """The conversion of images. Raises NotFoundError if the LUT was deleted."""
+        table = None if self.lut is None else load_table(self.lut)
+        return DisplayTransform(self.exposure, self.tone_map, self.temperature, self.tint, table)
 
 
 class BackgroundLook(_FrozenModel):

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from relume.core.errors import DiskFullError, ParameterError, RelumeError, ShapeMismatchError
+from relume.image_io.display_transform import DisplayTransform
 from relume.image_io.ocio.view import OcioView
 from relume.image_io.tone_mapping import tone_map
 from relume.image_io.write_image import to_bytes, write_image
@@ -22,14 +23,14 @@ def image():
 
 def test_exr_keeps_linear_radiance_to_the_last_bit(tmp_path, image):
     image[0, 0] = (1e6, 1e-6, 0)
-    write_image(tmp_path / "a.exr", image, exposure=3.0)
+    write_image(tmp_path / "a.exr", image, DisplayTransform(3.0))
     buffer = OpenImageIO.ImageBuf(str(tmp_path / "a.exr"))
     np.testing.assert_array_equal(buffer.get_pixels(OpenImageIO.FLOAT), image)
     assert list(buffer.spec().channelnames) == ["R", "G", "B"]
 
 
 def test_png_has_the_displayed_values(tmp_path, image):
-    write_image(tmp_path / "a.png", image, 1.0, "filmic")
+    write_image(tmp_path / "a.png", image, DisplayTransform(1.0, "filmic"))
     shown = OpenImageIO.ImageBuf(str(tmp_path / "a.png")).get_pixels(OpenImageIO.UINT8)
     np.testing.assert_array_equal(shown, np.round(tone_map(image, 1.0, "filmic") * 255))
 
@@ -43,11 +44,11 @@ def test_webp_is_close_to_the_displayed_values(tmp_path, image):
 
 
 def test_png_declares_its_color_space(tmp_path, image, monkeypatch):
-    monkeypatch.setattr("relume.image_io.write_image.tone_map", lambda shown, exposure, view: shown)
+    monkeypatch.setattr("relume.image_io.write_image.to_display", lambda shown, transform: shown)
     views = ["agx", OcioView("sRGB - Display", "Un-tone-mapped"), OcioView("Display P3 - Display", "Un-tone-mapped")]
     tagged = []
     for view in views:
-        write_image(tmp_path / "a.png", image, 0.0, view)
+        write_image(tmp_path / "a.png", image, DisplayTransform(0.0, view))
         with Image.open(tmp_path / "a.png") as png:
             tagged.append("srgb" in png.info)
     assert tagged == [True, True, False]
@@ -107,7 +108,7 @@ def test_bad_arguments_are_refused_before_anything_is_written(tmp_path, image):
     with pytest.raises(ParameterError, match=r"\.exr"):
         write_image(tmp_path / "a.gif", image)
     with pytest.raises(ParameterError, match="tone_map"):
-        write_image(tmp_path / "a.png", image, 0.0, "reinhard")
+        write_image(tmp_path / "a.png", image, DisplayTransform(0.0, "reinhard"))
     for shape in ((3,), (4, 4), (4, 4, 5), (0, 4, 3)):
         with pytest.raises(ShapeMismatchError):
             write_image(tmp_path / "a.exr", np.zeros(shape, np.float32))

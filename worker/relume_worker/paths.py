@@ -46,6 +46,11 @@ def images_path(data_dir: Path) -> Path:
     return data_dir / "images"
 
 
+def luts_path(data_dir: Path) -> Path:
+    """Folder of display LUTs; see `relume.luts.lut_store`."""
+    return data_dir / "luts"
+
+
 def bake_path(data_dir: Path, bake_id: str) -> Path:
     """The published store of a bake."""
     return data_dir / "bakes" / f"{_check_id(bake_id)}.zarr"

@@ -57,4 +57,4 @@ def save(path: Path, image: NDArray[Any], look: Any) -> None:
     """Write linear radiance, (H, W, 3); display formats apply exposure and tone mapping of the look."""
     from relume.image_io.write_image import write_image
 
-    write_image(path, image, look.display.exposure, look.display.tone_map)
+    write_image(path, image, look.display.transform)

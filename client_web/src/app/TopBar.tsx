@@ -21,6 +21,7 @@ import { Slider } from "../ui/Slider";
 import { ToggleButton } from "../ui/ToggleButton";
 import { useDrag } from "../ui/drag";
 import { BakeMenu } from "./BakeMenu";
+import { DisplayMenu } from "./DisplayMenu";
 import { ExportMenu } from "./ExportMenu";
 import { Overflow } from "./Overflow";
 import { ImportWarningsMenu } from "./ImportWarningsMenu";
@@ -105,6 +106,7 @@ function DisplayControls() {
         onChange={(value) => editValue("Exposure", "/display/exposure", value)}
       />
       <ToneMapSelect toneMap={display.tone_map} />
+      <DisplayMenu />
     </div>
   );
 }

@@ -13,6 +13,7 @@ import { look } from "../state/look";
 import { filmstripOpen, helpOpen, histogramOpen, inspectorOpen, scenePanelOpen, timelineOpen } from "../state/panels";
 import { togglePlay } from "../panels/timeline/playback";
 import { activeViewName, toggleSideBySide } from "../state/views";
+import { toggleAreaProbe } from "../viewport/AreaProbe";
 import { freeCameraOf, type FreeCamera } from "../viewport/cameras/freeCamera";
 import { toggleNavigation } from "../viewport/cameras/navigation";
 import { showNote, reportErrors } from "../ui/toasts";
@@ -56,7 +57,13 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Actual size", keys: ["0"], run: zoomActual },
   { group: "Picture", label: "Views side by side", keys: ["v"], run: toggleSideBySide },
   { group: "Picture", label: "Exposure heat map", keys: ["e"], run: () => (falseColor.value = !falseColor.value) },
-  { group: "Picture", label: "Histogram", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
+  {
+    group: "Picture",
+    label: "Histogram, waveform, parade",
+    keys: ["h"],
+    run: () => (histogramOpen.value = !histogramOpen.value),
+  },
+  { group: "Picture", label: "Area probe", keys: ["r"], run: toggleAreaProbe },
   { group: "Picture", label: "Solo selection", keys: ["s"], run: toggleSolo },
   { group: "Picture", label: "Light handles", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
   { group: "Picture", label: "Exposure −⅓ stop", keys: [","], run: () => changeExposure(-THIRD_STOP) },
@@ -118,6 +125,8 @@ export const FOCUS_KEYS: readonly (readonly [label: string, keys: readonly strin
   ["Light handle: select", ["Enter", "Space"]],
   ["Light handle: move", ["←", "→", "↑", "↓"]],
   ["Light handle: farther, nearer", ["Shift+↑", "Shift+↓"]],
+  ["Area probe: move, by 10 px", ["←", "Ctrl+arrow"]],
+  ["Area probe: resize", ["Shift+arrow"]],
   ["Comment pin: move", ["←", "→", "↑", "↓"]],
   ["Comment pin: move by 10 px", ["Shift+arrow"]],
   ["Picture: pan, or orbit camera", ["←", "→", "↑", "↓"]],

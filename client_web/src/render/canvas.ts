@@ -2,18 +2,22 @@
  * only its view. */
 import { effect, signal } from "@preact/signals";
 import { soloMaterial } from "../state/visibility/soloSources";
-import { toneMap } from "../state/color";
+import { displayTransform } from "../state/color";
 import { brushedRange } from "../state/curvePreview";
-import { displayedFrames, falseColor, isDisplayFrozen, isReferenceShown, wipe } from "../state/display";
+import { difference, displayedFrames, falseColor, isDisplayFrozen, isReferenceShown, wipe } from "../state/display";
 import { recordFrameShown } from "../state/latency";
-import { exposure } from "../state/look";
 import { materialNames } from "../state/scene";
 import { hoveredMaterial } from "../state/selection";
 import { focusedView, sideBySide } from "../state/views";
+import type { DifferenceMode } from "./color/difference";
 import type { ViewImage, ImagePresenter } from "./viewImage";
 import { DisplayRenderer } from "./displayRenderer";
 import { MARGIN_ALONE, MARGIN_GRID, displayedWidth, toScreenPoint, type CanvasGeometry } from "./zoomTransform";
 import { transformOf } from "./viewTransforms";
+
+/** The mode of the difference that an image can show: both sides must have radiance. */
+const differenceOf = ({ reference, display }: ViewImage, mode: DifferenceMode): DifferenceMode =>
+  reference === null || display !== null ? "off" : mode;
 
 const MAX_WAIT_MS = 250;
 const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
@@ -133,9 +137,9 @@ export class ImageCanvas implements ImagePresenter {
     return {
       held: isDisplayFrozen.value,
       transform: transformOf(view),
-      exposure: exposure.value,
-      toneMap: toneMap.value,
+      display: displayTransform.value,
       falseColor: falseColor.value,
+      difference: differenceOf(this.current, difference.value),
       wipe: reference === null ? -1 : displaysA ? 2 : isOn ? position : -1,
       hover: hovered === null || ids === null ? -1 : materialNames.value.indexOf(hovered),
       solo: soloName === null || ids === null ? -1 : materialNames.value.indexOf(soloName),

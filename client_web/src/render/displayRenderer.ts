@@ -1,12 +1,14 @@
 /** WebGL2 rendering of the image. All its data is also on the CPU, so a lost context only costs a redraw. */
-import type { LutTable } from "./color/lutTable";
-import type { DisplayedToneMap } from "./color/tonemap";
-import { LUT_SIZE, type Tile } from "../protocol";
+import { lutSize, type LutTable } from "./color/lutTable";
+import type { DifferenceMode } from "./color/difference";
+import type { DisplayTransform } from "./color/tonemap";
+import type { Tile } from "../protocol";
 import { allocate, makeTexture, makeVolume, Program } from "./webgl";
 import type { PixelBuffer } from "./pixels";
 import { fragmentShader, VERTEX, type DisplayFeatures } from "./displayShaders";
 
 const UNITS = ["uImage", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
+const VOLUMES = ["uTable", "uLut"] as const;
 type TextureUnit = (typeof UNITS)[number];
 /** Screen pixels per image pixel from which on pixels are drawn without filtering. */
 const NEAREST_FROM = 6;
@@ -14,10 +16,10 @@ const NEAREST_FROM = 6;
 export interface DisplayState {
   /** Left, top, width, height of the image in device pixels. */
   transform: [number, number, number, number];
-  exposure: number;
-  toneMap: DisplayedToneMap;
+  display: DisplayTransform;
   falseColor: boolean;
   wipe: number;
+  difference: DifferenceMode;
   hover: number;
   /** Id of the solo material, -1 for none. */
   solo: number;
@@ -33,9 +35,8 @@ export class DisplayRenderer {
   private programs = new Map<string, Program>();
   private textures!: Record<TextureUnit, WebGLTexture>;
   private size: [number, number] = [1, 1];
-  /** The view's table and its texture. */
-  private tableTexture!: WebGLTexture;
-  private table: LutTable | null = null;
+  /** The tables of the view and of the display LUT, and their textures. */
+  private volumes!: { texture: WebGLTexture; table: LutTable | null }[];
 
   constructor(readonly canvas: HTMLCanvasElement) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
@@ -61,8 +62,7 @@ export class DisplayRenderer {
     this.setReferenceAlpha(1, 1, new Uint8Array(1));
     this.setIds(1, 1, new Uint16Array([65535]));
     this.setDisplay(new ImageData(1, 1));
-    this.tableTexture = makeVolume(gl);
-    this.table = null;
+    this.volumes = VOLUMES.map(() => ({ texture: makeVolume(gl), table: null }));
   }
 
   /** Release the context: browsers limit their number. */
@@ -77,7 +77,7 @@ export class DisplayRenderer {
       program = new Program(this.gl, VERTEX, fragmentShader(features));
       this.programs.set(key, program);
       this.gl.useProgram(program.handle);
-      [...UNITS, "uTable"].forEach((unit, index) => this.gl.uniform1i(program?.uniform(unit) ?? null, index));
+      [...UNITS, ...VOLUMES].forEach((unit, index) => this.gl.uniform1i(program?.uniform(unit) ?? null, index));
     } else this.gl.useProgram(program.handle);
     return program;
   }
@@ -139,24 +139,28 @@ export class DisplayRenderer {
     const { gl, canvas } = this;
     if (gl.isContextLost()) return;
     gl.viewport(0, 0, canvas.width, canvas.height);
+    const { matrix, toneMap, lut } = state.display;
     const program = this.use({
-      toneMap: typeof state.toneMap === "string" ? state.toneMap : "table",
+      toneMap: typeof toneMap === "string" ? toneMap : "table",
+      lut: lut !== null,
       falseColor: state.falseColor,
       isMinified: state.transform[2] < this.size[0],
       displayReferred: state.displayReferred,
       transparent: state.transparent,
-      compare: state.wipe > 0,
+      compare: state.wipe > 0 || state.difference !== "off",
+      difference: state.difference,
       transparentReference: state.wipe > 0 && state.transparentReference,
       brush: state.brush,
       outline: state.hover >= 0,
       solo: state.solo >= 0,
     });
     this.bindTextures(state.transform[2] / this.size[0] >= NEAREST_FROM);
-    if (typeof state.toneMap !== "string") this.bindTable(state.toneMap);
+    this.bindVolume(0, typeof toneMap === "string" ? null : toneMap);
+    this.bindVolume(1, lut);
     gl.uniform2f(program.uniform("uCanvas"), canvas.width, canvas.height);
     gl.uniform4f(program.uniform("uImageRect"), ...state.transform);
     gl.uniform2f(program.uniform("uSize"), ...this.size);
-    gl.uniform1f(program.uniform("uGain"), 2 ** state.exposure);
+    gl.uniformMatrix3fv(program.uniform("uDisplayMatrix"), true, matrix.flat());
     gl.uniform1f(program.uniform("uWipe"), state.wipe);
     gl.uniform1i(program.uniform("uHover"), state.hover);
     gl.uniform1i(program.uniform("uSolo"), state.solo);
@@ -164,13 +168,16 @@ export class DisplayRenderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  private bindTable(table: LutTable): void {
+  private bindVolume(index: number, table: LutTable | null): void {
     const { gl } = this;
-    gl.activeTexture(gl.TEXTURE0 + UNITS.length);
-    gl.bindTexture(gl.TEXTURE_3D, this.tableTexture);
-    if (table === this.table) return;
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGB16F, LUT_SIZE, LUT_SIZE, LUT_SIZE, 0, gl.RGB, gl.FLOAT, table);
-    this.table = table;
+    const volume = this.volumes[index];
+    if (table === null || volume === undefined) return;
+    gl.activeTexture(gl.TEXTURE0 + UNITS.length + index);
+    gl.bindTexture(gl.TEXTURE_3D, volume.texture);
+    if (table === volume.table) return;
+    const size = lutSize(table);
+    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGB16F, size, size, size, 0, gl.RGB, gl.FLOAT, table);
+    volume.table = table;
   }
 
   private bindTextures(magnified: boolean): void {

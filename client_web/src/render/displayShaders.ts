@@ -3,12 +3,16 @@
  * Unused features are not compiled in: a software rasterizer pays for branches not taken, and the plain image is three
  * times as fast without them. */
 
-import { LUT_GAIN, LUT_SIZE } from "../protocol";
+import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
+import { BLACK, LMS_TO_ITP, PQ, RANGES, RGB_TO_LMS, SCALES, type DifferenceMode } from "./color/difference";
+import type { Matrix } from "./color/whiteBalance";
 
 /** Features of a shader variant, compiled when first needed. */
 export interface DisplayFeatures {
   toneMap: "none" | "agx" | "filmic" | "table";
   falseColor: boolean;
+  /** A display LUT follows the tone map. */
+  lut: boolean;
   /** The image is minified. */
   isMinified: boolean;
   /** The server has tone-mapped the image already. */
@@ -16,6 +20,8 @@ export interface DisplayFeatures {
   /** The image has transparent parts, shown over a checkerboard. */
   transparent: boolean;
   compare: boolean;
+  /** Show the difference from the A side. */
+  difference: DifferenceMode;
   /** The same for the A side. */
   transparentReference: boolean;
   brush: boolean;
@@ -41,10 +47,13 @@ export function fragmentShader(features: DisplayFeatures): string {
           : features.toneMap === "table"
             ? "TABLE"
             : "PLAIN",
+    features.lut && !features.falseColor && "LUT",
     features.isMinified && "MINIFIED",
     features.displayReferred && "DISPLAY_REFERRED",
     features.transparent && "TRANSPARENT",
     features.compare && "COMPARE",
+    features.difference === "stops" && "DIFFERENCE_STOPS",
+    features.difference === "delta_e" && "DIFFERENCE_DELTA_E",
     features.transparentReference && "TRANSPARENT_REFERENCE",
     features.brush && "BRUSH",
     features.outline && "OUTLINE",
@@ -54,6 +63,36 @@ export function fragmentShader(features: DisplayFeatures): string {
   const table = [`#define GAIN ${LUT_GAIN.toFixed(1)}`, `#define LAST ${(LUT_SIZE - 1).toFixed(1)}`];
   return ["#version 300 es", ...lines, ...table, FRAGMENT_BODY].join("\n");
 }
+
+const vec3Text = (color: Rgb): string => `vec3(${color.map((v) => v.toFixed(8)).join(", ")})`;
+/** GLSL's constructor takes columns. */
+const mat3Text = (matrix: Matrix): string => `transpose(mat3(${matrix.map(vec3Text).join(", ")}))`;
+
+/** See `color/difference.ts`. */
+const DIFFERENCE = `
+#ifdef DIFFERENCE_STOPS
+vec3 differenceColor(vec3 a, vec3 b) {
+  const vec3 weights = vec3(0.2126, 0.7152, 0.0722);
+  float levelA = max(dot(uDisplayMatrix * a, weights), 0.0) + ${BLACK}, levelB = max(dot(uDisplayMatrix * b, weights), 0.0) + ${BLACK};
+  float t = clamp(log2(levelA / levelB) / ${RANGES.stops.toFixed(1)}, -1.0, 1.0);
+  return mix(${vec3Text(SCALES.stops[1])}, t < 0.0 ? ${vec3Text(SCALES.stops[0])} : ${vec3Text(SCALES.stops[2])}, abs(t));
+}
+#endif
+
+#ifdef DIFFERENCE_DELTA_E
+vec3 itp(vec3 x) {
+  vec3 linear = mix(x / 12.92, pow((x + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), x));
+  vec3 power = pow(max(${mat3Text(RGB_TO_LMS)} * linear, 0.0) / 100.0, vec3(${PQ.m1}));
+  return ${mat3Text(LMS_TO_ITP)} * pow((${PQ.c1} + ${PQ.c2} * power) / (1.0 + ${PQ.c3} * power), vec3(${PQ.m2}));
+}
+
+vec3 differenceColor(vec3 a, vec3 b) {
+  float t = clamp(720.0 * distance(itp(display(a)), itp(display(b))) / ${RANGES.delta_e.toFixed(1)}, 0.0, 1.0);
+  return t < 0.5 ? mix(${vec3Text(SCALES.delta_e[0])}, ${vec3Text(SCALES.delta_e[1])}, 2.0 * t)
+    : mix(${vec3Text(SCALES.delta_e[1])}, ${vec3Text(SCALES.delta_e[2])}, 2.0 * t - 1.0);
+}
+#endif
+`;
 
 const FRAGMENT_BODY = `precision highp float;
 precision highp usampler2D;
@@ -68,7 +107,7 @@ uniform usampler2D uIds;       // material of each pixel, 65535 = background
 uniform vec2 uCanvas;          // device pixels
 uniform vec4 uImageRect;           // left, top, width, height of the image, device pixels from the top left
 uniform vec2 uSize;            // size of the image in pixels
-uniform float uGain;           // 2^exposure
+uniform mat3 uDisplayMatrix;   // exposure times white balance
 uniform float uWipe;           // fraction of the image left of which the A side shows
 uniform int uHover;            // material to outline
 uniform int uSolo;             // solo material
@@ -97,24 +136,39 @@ vec3 filmic(vec3 x) {
   return srgb((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14));
 }
 
-#ifdef TABLE
-uniform highp sampler3D uTable;  // display values; blue is the quickest
-
-vec3 node(vec3 at) {
-  return texelFetch(uTable, ivec3(at.bgr), 0).rgb;
+#if defined(TABLE) || defined(LUT)
+vec3 node(highp sampler3D nodes, vec3 at) {
+  return texelFetch(nodes, ivec3(at.bgr), 0).rgb;
 }
 
 // tetrahedral interpolation: corners at 0, plus the largest fraction's axis, minus the smallest's, at 1
-vec3 table(vec3 x) {
+vec3 interpolated(highp sampler3D nodes, vec3 coordinate, float last) {
   const vec3 R = vec3(1.0, 0.0, 0.0), G = vec3(0.0, 1.0, 0.0), B = vec3(0.0, 0.0, 1.0);
-  vec3 coordinate = min(log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN)), 1.0) * LAST;
-  vec3 at = min(floor(coordinate), LAST - 1.0);
+  vec3 at = min(floor(coordinate), last - 1.0);
   vec3 fraction = coordinate - at;
   vec3 longest = fraction.r >= fraction.g ? (fraction.r >= fraction.b ? R : B) : (fraction.g >= fraction.b ? G : B);
   vec3 shortest = fraction.r < fraction.g ? (fraction.r < fraction.b ? R : B) : (fraction.g < fraction.b ? G : B);
   float largest = dot(fraction, longest), smallest = dot(fraction, shortest), middle = fraction.r + fraction.g + fraction.b - largest - smallest;
-  return (1.0 - largest) * node(at) + (largest - middle) * node(at + longest)
-    + (middle - smallest) * node(at + 1.0 - shortest) + smallest * node(at + 1.0);
+  return (1.0 - largest) * node(nodes, at) + (largest - middle) * node(nodes, at + longest)
+    + (middle - smallest) * node(nodes, at + 1.0 - shortest) + smallest * node(nodes, at + 1.0);
+}
+#endif
+
+#ifdef TABLE
+uniform highp sampler3D uTable;  // display values; blue is the quickest
+
+vec3 table(vec3 x) {
+  vec3 shaped = log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN));
+  return interpolated(uTable, min(shaped, 1.0) * LAST, LAST);
+}
+#endif
+
+#ifdef LUT
+uniform highp sampler3D uLut;  // display values by display values
+
+vec3 displayLut(vec3 x) {
+  float last = float(textureSize(uLut, 0).x - 1);
+  return interpolated(uLut, clamp(x, 0.0, 1.0) * last, last);
 }
 #endif
 
@@ -132,11 +186,8 @@ vec3 falseColor(vec3 x) {
   return vec3(1.0);
 }
 
-vec3 display(vec3 x) {
-  x *= uGain;
-#if defined(FALSE_COLOR)
-  return falseColor(x);
-#elif defined(AGX)
+vec3 toneMapped(vec3 x) {
+#if defined(AGX)
   return agx(x);
 #elif defined(FILMIC)
   return filmic(x);
@@ -144,6 +195,17 @@ vec3 display(vec3 x) {
   return table(x);
 #else
   return srgb(x);
+#endif
+}
+
+vec3 display(vec3 x) {
+  x = max(uDisplayMatrix * x, 0.0);
+#if defined(FALSE_COLOR)
+  return falseColor(x);
+#elif defined(LUT)
+  return displayLut(toneMapped(x));
+#else
+  return toneMapped(x);
 #endif
 }
 
@@ -194,6 +256,7 @@ vec3 displayed(vec2 uv, bool reference) {
 #endif
 }
 
+${DIFFERENCE}
 int idAt(vec2 uv) {
   ivec2 p = clamp(ivec2(uv * uSize), ivec2(0), ivec2(uSize) - 1);
   return int(texelFetch(uIds, p, 0).r);
@@ -220,7 +283,9 @@ void main() {
 #ifdef COMPARE
   reference = uv.x < uWipe;
 #endif
-#ifdef DISPLAY_REFERRED
+#if defined(DIFFERENCE_STOPS) || defined(DIFFERENCE_DELTA_E)
+  vec3 color = differenceColor(filtered(uv, true).rgb, filtered(uv, false).rgb);
+#elif defined(DISPLAY_REFERRED)
   vec3 color = reference ? displayed(uv, true) : texture(uDisplay, uv).rgb;
 #ifdef TRANSPARENT
   if (!reference) color += (1.0 - filtered(uv, false).a) * checkerboard();

@@ -1,6 +1,7 @@
 /** Histogram of an image: luminance, red, green and blue in stops relative to middle gray. */
 import { decodeRgb9e5 } from "./color/rgb9e5";
 import { luminance } from "./color/tonemap";
+import { transformColor, type Matrix } from "./color/whiteBalance";
 
 export const MIDDLE_GRAY = 0.18;
 export const MIN_STOP = -10;
@@ -23,21 +24,20 @@ export function binIndex(value: number): number {
   return Math.min(NUM_BINS - 1, Math.max(0, Math.floor((stop - MIN_STOP) * BINS_PER_STOP)));
 }
 
-/** Histogram of RGB9_E5 pixels under an exposure in stops; a large image is sampled uniformly. */
-export function computeHistogram(encoded: Uint32Array, exposure: number): Histogram {
+/** Histogram of RGB9_E5 pixels under a display matrix; a large image is sampled uniformly. */
+export function computeHistogram(encoded: Uint32Array, matrix: Matrix): Histogram {
   const bins = () => new Uint32Array(NUM_BINS);
   const result: Histogram = { luminance: bins(), channels: [bins(), bins(), bins()], samples: 0 };
   const count = (bins: Uint32Array, value: number) => {
     const bin = binIndex(value);
     bins[bin] = (bins[bin] as number) + 1;
   };
-  const gain = 2 ** exposure;
   // an odd step avoids aliasing with the image's columns
   const step = Math.ceil(encoded.length / MAX_SAMPLES) | 1;
   for (let i = 0; i < encoded.length; i += step) {
-    const rgb = decodeRgb9e5(encoded[i] as number);
-    count(result.luminance, gain * luminance(rgb));
-    result.channels.forEach((channel, c) => count(channel, gain * (rgb[c] as number)));
+    const rgb = transformColor(matrix, decodeRgb9e5(encoded[i] as number));
+    count(result.luminance, luminance(rgb));
+    result.channels.forEach((channel, c) => count(channel, rgb[c] as number));
     result.samples += 1;
   }
   return result;

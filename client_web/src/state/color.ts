@@ -1,16 +1,25 @@
 /** The server's OpenColorIO config, and display transforms: tone maps, or tables of its views. */
 import { computed, signal } from "@preact/signals";
 import type { LutTable } from "../render/color/lutTable";
-import type { DisplayedToneMap } from "../render/color/tonemap";
+import type { DisplayedToneMap, DisplayTransform } from "../render/color/tonemap";
+import { displayMatrix } from "../render/color/whiteBalance";
 import type { ColorBody, Look, OcioView } from "../protocol";
+import { displayGain } from "./look";
 
 type ToneMap = Look["display"]["tone_map"];
 
 export const colorConfig = signal<ColorBody | null>(null);
-/** Tables by view key; null: failed. */
+/** Tables by view key, or name of a display LUT; null: failed. */
 export const lutTables = signal<ReadonlyMap<string, LutTable | null>>(new Map());
-/** The current display transform. */
+/** The current tone map and display LUT. */
 export const toneMap = signal<DisplayedToneMap>("agx");
+export const displayLut = signal<LutTable | null>(null);
+/** The current display transform. */
+export const displayTransform = computed<DisplayTransform>(() => ({
+  matrix: displayGain.value,
+  toneMap: toneMap.value,
+  lut: displayLut.value,
+}));
 
 /** The chosen color space of EXR files; "": linear Rec. 709. */
 export const exrSpace = signal("");
@@ -43,5 +52,13 @@ export function lutFor(value: ToneMap): DisplayedToneMap | null {
   return table === undefined ? null : (table ?? "agx");
 }
 
-/** The same without waiting: falls back to AgX while loading. */
-export const displayedToneMap = (value: ToneMap): DisplayedToneMap => lutFor(value) ?? "agx";
+/** The table of a display LUT; undefined while loading, null without one. */
+export const displayLutFor = (name: string | null | undefined): LutTable | null | undefined =>
+  name ? lutTables.value.get(name) : null;
+
+/** The display transform of a look without waiting: falls back to AgX, and to no LUT, while loading. */
+export const transformOf = ({ exposure, temperature, tint, tone_map, lut }: Look["display"]): DisplayTransform => ({
+  matrix: displayMatrix(exposure, temperature, tint),
+  toneMap: lutFor(tone_map) ?? "agx",
+  lut: displayLutFor(lut) ?? null,
+});

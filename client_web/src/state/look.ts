@@ -1,5 +1,7 @@
 /** The edited look, and the scene's own. */
 import { computed, signal } from "@preact/signals";
+import { DEFAULTS } from "../look.gen";
+import { displayMatrix } from "../render/color/whiteBalance";
 import { isImageReference } from "./document/imageReference";
 import type { Look, MaterialLook, Term } from "../protocol";
 import { materialOf } from "./scene";
@@ -9,6 +11,10 @@ export const look = signal<Look | null>(null);
 export const defaultLook = signal<Look | null>(null);
 /** The display settings, applied without a round trip; a separate signal, so that other edits do not redraw the image twice. */
 export const exposure = computed(() => look.value?.display.exposure ?? 0);
+const temperature = computed(() => look.value?.display.temperature ?? DEFAULTS.display.temperature);
+const tint = computed(() => look.value?.display.tint ?? DEFAULTS.display.tint);
+/** Exposure times white balance. */
+export const displayGain = computed(() => displayMatrix(exposure.value, temperature.value, tint.value));
 /** True with the environment that the bake was made for; in another one, "exact" means exact for this bake. */
 export const usesBakedEnvironment = computed(() => (look.value?.environment.map ?? null) === null);
 /** True for a BTF term, whose texels the server draws. */

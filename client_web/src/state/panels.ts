@@ -12,6 +12,8 @@ export const timelineOpen = signal(false);
 export const filmstripOpen = signal(true);
 export const inspectorWidth = signal(320);
 export const histogramOpen = signal(false);
+export type Scope = "histogram" | "waveform" | "parade";
+export const scope = signal<Scope>("histogram");
 /** True if spots and panels keep aiming at the same point while moved. */
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
@@ -29,6 +31,7 @@ const STORED_PANELS: Record<string, Signal<unknown>> = {
   filmstripOpen,
   inspectorWidth,
   histogramOpen,
+  scope,
   aimLocked,
   folded: foldedSections,
   exrSpace,

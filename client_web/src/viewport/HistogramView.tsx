@@ -1,12 +1,15 @@
-/** Histogram of the displayed image, computed when input pauses. */
-import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
+/** Histogram, waveform or RGB parade of the displayed image, computed when input pauses. */
+import { useLayoutEffect, useMemo, useRef } from "preact/hooks";
 import { computeHistogram, MAX_STOP, MIN_STOP, NUM_BINS, percentile, type Histogram } from "../render/histogram";
 import { stage } from "../render/renderStage";
+import { computeWaveform, summarizeWaveform, type Waveform } from "../render/waveform";
 import { bake } from "../state/bakes";
-import { displayedFrames } from "../state/display";
+import { displayTransform } from "../state/color";
 import { isFrameExact } from "../state/fidelity";
-import { exposure } from "../state/look";
-import { histogramOpen } from "../state/panels";
+import { histogramOpen, scope, type Scope } from "../state/panels";
+import { RadioRow, type RadioOption } from "../ui/RadioRow";
+import { paintWaveform } from "./paintWaveform";
+import { useIdleFrame } from "./useIdleFrame";
 
 const WIDTH = 252;
 const HEIGHT = 84;
@@ -62,42 +65,63 @@ function paintHistogram(canvas: HTMLCanvasElement, histogram: Histogram): void {
   }
 }
 
-const IDLE_MS = 250; // after the last frame
+/** Columns of the waveform, and of each channel of the parade. */
+const WAVEFORM_COLUMNS = { waveform: WIDTH / 2, parade: WIDTH / 3 };
 
-/** The histogram once frames pause, and whether the image was exact. */
-function useHistogram(): { histogram: Histogram; isExact: boolean } | null {
-  const [idleFrame, setIdleFrame] = useState(-1);
-  const frame = displayedFrames.value;
-  useEffect(() => {
-    const timer = setTimeout(() => setIdleFrame(frame), IDLE_MS);
-    return () => clearTimeout(timer);
-  }, [frame]);
+const SCOPES: readonly RadioOption<Scope>[] = [
+  { value: "histogram", label: "Histogram", title: "Luminance and channels in stops" },
+  { value: "waveform", label: "Waveform", title: "Luma of display values, by column of the image" },
+  { value: "parade", label: "Parade", title: "Red, green and blue of display values, by column of the image" },
+];
+
+type Scoped = { scope: "histogram"; histogram: Histogram } | { scope: "waveform" | "parade"; waveform: Waveform };
+
+/** The scope's values once frames pause, and whether the image was exact. */
+function useScope(scope: Scope): { values: Scoped; isExact: boolean } | null {
+  const idleFrame = useIdleFrame();
   void bake.value; // another scene may have a view of the same name
-  const [image, stops, isExact] = [stage.active, exposure.value, isFrameExact.value];
+  const [image, transform, isExact] = [stage.active, displayTransform.value, isFrameExact.value];
   return useMemo(() => {
     const { hasPixels, pixels } = image;
-    return idleFrame < 0 || !hasPixels ? null : { histogram: computeHistogram(pixels.encoded, stops), isExact };
-  }, [idleFrame, image, stops, isExact]);
+    if (idleFrame < 0 || !hasPixels) return null;
+    const values: Scoped =
+      scope === "histogram"
+        ? { scope, histogram: computeHistogram(pixels.encoded, transform.matrix) }
+        : { scope, waveform: computeWaveform(pixels, transform, WAVEFORM_COLUMNS[scope], HEIGHT) };
+    return { values, isExact };
+  }, [idleFrame, image, transform, isExact, scope]);
 }
 
-function HistogramBars() {
+function paint(canvas: HTMLCanvasElement, values: Scoped): void {
+  if (values.scope === "histogram") paintHistogram(canvas, values.histogram);
+  else paintWaveform(canvas, values.waveform, values.scope === "parade", [WIDTH, HEIGHT]);
+}
+
+const LABELS: Record<Scope, string> = {
+  histogram: "Histogram, stops relative to middle gray",
+  waveform: "Waveform, display values in percent",
+  parade: "RGB parade, display values in percent",
+};
+
+function Scopes() {
   const canvas = useRef<HTMLCanvasElement>(null);
-  const histogram = useHistogram();
+  const scoped = useScope(scope.value);
   useLayoutEffect(() => {
-    if (histogram !== null) paintHistogram(canvas.current as HTMLCanvasElement, histogram.histogram);
-  }, [histogram]);
-  const summaryText =
-    histogram === null
-      ? "Waiting for the picture…"
-      : `${histogram.isExact ? "" : "Approximate: "}${summarize(histogram.histogram)}`;
+    if (scoped !== null) paint(canvas.current as HTMLCanvasElement, scoped.values);
+  }, [scoped]);
+  const summary = (values: Scoped) =>
+    values.scope === "histogram" ? summarize(values.histogram) : summarizeWaveform(values.waveform);
+  const text =
+    scoped === null ? "Waiting for the picture…" : `${scoped.isExact ? "" : "Approximate: "}${summary(scoped.values)}`;
   return (
-    <figure class="histogram" aria-label="Histogram, stops relative to middle gray">
+    <figure class="histogram" aria-label={LABELS[scope.value]}>
+      <RadioRow label="Scope" choices={SCOPES} selected={scope.value} onSelect={(value) => (scope.value = value)} />
       <canvas ref={canvas} aria-hidden="true" style={{ width: `${WIDTH}px`, height: `${HEIGHT}px` }} />
-      <figcaption>{summaryText}</figcaption>
+      <figcaption>{text}</figcaption>
     </figure>
   );
 }
 
 export function HistogramView() {
-  return histogramOpen.value ? <HistogramBars /> : null;
+  return histogramOpen.value ? <Scopes /> : null;
 }

@@ -21,6 +21,7 @@ import { wipe } from "../state/display";
 import { scene } from "../state/scene";
 import { showSingleView, sideBySide, activeViewName, views, setFocus } from "../state/views";
 import { reportErrors, showError, showNote } from "../ui/toasts";
+import { AreaFrame } from "./AreaProbe";
 import { BusyOverlay } from "./BusyOverlay";
 import { WipeHandle } from "./WipeHandle";
 import { panView, useViewPointer } from "./usePointer";
@@ -190,6 +191,7 @@ export function ViewCell({ view }: { view: string }) {
         </p>
       )}
       {screen !== null && <LightHandles screen={screen} />}
+      {screen !== null && <AreaFrame screen={screen} />}
       {screen !== null && <CommentPins screen={screen} />}
       {isMatchOpen.value && screen !== null && <MatchBrush screen={screen} />}
       {wipe.value.isOn && screen !== null && <WipeHandle screen={screen} />}

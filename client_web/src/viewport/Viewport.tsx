@@ -6,7 +6,9 @@ import { PlacementBar } from "../panels/lights/PlacementBar";
 import { shownViews, activeView } from "../state/views";
 import { Toasts } from "../ui/toasts";
 import { ViewCell } from "./ViewCell";
+import { DifferenceLegend } from "./DifferenceLegend";
 import { FalseColorLegend } from "./FalseColorLegend";
+import { AreaReadout } from "./AreaProbe";
 import { HistogramView } from "./HistogramView";
 import { FilterBadge } from "./FilterBadge";
 import { ViewportBar } from "./ViewportBar";
@@ -47,10 +49,12 @@ export function Viewport() {
         <MatchBar />
         <PlacementBar />
         <FilterBadge />
+        <AreaReadout />
         <HistogramView />
         <Toasts />
       </div>
       <CameraBar />
+      <DifferenceLegend />
       <FalseColorLegend />
       <ViewportBar />
     </main>

@@ -4,14 +4,15 @@ import { isMatchOpen } from "../state/match";
 import { toDisplay } from "../render/color/tonemap";
 import { stage } from "../render/renderStage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";
-import { toneMap } from "../state/color";
+import { displayTransform } from "../state/color";
+import { isAreaProbeOn } from "../state/areaProbe";
 import { openComments } from "../state/comments";
 import { displayedFrames, falseColor } from "../state/display";
-import { exposure } from "../state/look";
 import { histogramOpen } from "../state/panels";
 import { pixelProbe } from "../state/pointerPixel";
 import { shownPanels, togglePanel } from "../state/panelWidths";
 import { formatNumber } from "../ui/scale";
+import { toggleAreaProbe } from "./AreaProbe";
 
 function PixelProbe() {
   void displayedFrames.value;
@@ -19,7 +20,7 @@ function PixelProbe() {
   const image = probed === null ? null : stage.imageOf(probed.view);
   const radiance = probed === null ? null : (image?.radiance(probed.x, probed.y) ?? null);
   if (probed === null || radiance === null) return <span class="probe quiet">Hover to inspect a pixel</span>;
-  const displayed = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
+  const displayed = toDisplay(radiance, displayTransform.value).map((v) => Math.round(255 * v));
   const material = image?.ids ? image.material(probed.x, probed.y) : probed.answer?.material;
   return (
     <span class="probe">
@@ -59,11 +60,18 @@ export function ViewportBar() {
         Match
       </button>
       <button
+        aria-pressed={isAreaProbeOn.value}
+        title="Mean, minimum and maximum of a rectangle; drag it in the picture (R)"
+        onClick={toggleAreaProbe}
+      >
+        Area
+      </button>
+      <button
         aria-pressed={histogramOpen.value}
-        title="Brightness distribution (H)"
+        title="Histogram, waveform or RGB parade (H)"
         onClick={() => (histogramOpen.value = !histogramOpen.value)}
       >
-        Histogram
+        Scopes
       </button>
       <button
         aria-pressed={falseColor.value}

@@ -6,11 +6,14 @@ import { dollyOrbit, panOrbit } from "./cameras/orbit";
 import { dragCamera } from "./cameras/useCameraControl";
 import { placePin } from "../panels/collaboration/commentActions";
 import { placeLightAt, placingKind } from "../panels/lights/placement";
+import { makeGray } from "../panels/looks/whiteBalance";
 import { requestPixelProbe } from "../session/pixelProbe";
 import { pickMaterial } from "../render/materialPicking";
 import type { ImageCanvas } from "../render/canvas";
 import { panTransform, zoomAt } from "../render/zoomTransform";
 import { setTransform, transformOf } from "../render/viewTransforms";
+import { areaBetween, isAreaProbeOn, probedArea } from "../state/areaProbe";
+import { isPickingGray } from "../state/display";
 import { pendingPin } from "../state/comments";
 import { hoveredMaterial, selectMaterial } from "../state/selection";
 import { hoveredView } from "../state/views";
@@ -54,7 +57,14 @@ function pinchCamera(screen: ImageCanvas, view: string, { across, down, center, 
 /** `isRightHeld`: set while the right button is held. */
 export function useViewPointer(screen: ImageCanvas | null, view: string, isRightHeld: { current: boolean }) {
   const drag = useRef({ x: 0, y: 0, moved: false });
+  const areaStart = useRef<[number, number] | null>(null);
   const begin = (event: PointerEvent) => {
+    areaStart.current = null;
+    if (isAreaProbeOn.peek() && event.button === 0 && screen !== null) {
+      const { px, py } = pickMaterial(screen, event);
+      areaStart.current = [px, py];
+      return true;
+    }
     drag.current = { x: event.clientX, y: event.clientY, moved: false };
     const freeCamera = freeCameraOf(view);
     void freeCamera?.grab();
@@ -64,6 +74,12 @@ export function useViewPointer(screen: ImageCanvas | null, view: string, isRight
   const move = (event: PointerEvent) => {
     if (screen === null) return;
     hoveredView.value = view;
+    if (areaStart.current !== null) {
+      const { px, py } = pickMaterial(screen, event);
+      const { width, height } = screen.image.pixels;
+      probedArea.value = areaBetween(areaStart.current, [px, py], [width, height]);
+      return;
+    }
     const { x, y, moved } = drag.current;
     const [dx, dy] = [event.clientX - x, event.clientY - y];
     if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
@@ -85,7 +101,8 @@ export function useViewPointer(screen: ImageCanvas | null, view: string, isRight
     isRightHeld.current = false;
     if (screen === null || !released || drag.current.moved || event.button !== 0) return;
     const { px, py, material } = pickMaterial(screen, event);
-    if (placingKind.peek() !== null) void placeLightAt(view, px, py);
+    if (isPickingGray.peek()) makeGray(screen.image.radiance(px, py));
+    else if (placingKind.peek() !== null) void placeLightAt(view, px, py);
     else if (pendingPin.peek() !== null) placePin(view, px, py);
     else if (freeCameraOf(view) !== null) void selectAt(view, px, py);
     else if (material !== null) selectMaterial(material);

@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.image_io.color_difference import color_difference
-from relume.image_io.tone_mapping import tone_map
+from relume.image_io.display_transform import to_display
 from relume.live.fixed_camera.fidelity import ImageError
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.look.model import DisplayLook
@@ -54,7 +54,7 @@ def pixel_errors(
     """
     height, width = image.shape[:2]
     is_surface = gbuffer.shows_surface(width * height).reshape(height, width).astype(np.float64)
-    displayed, exact_displayed = (tone_map(each, display.exposure, display.tone_map) for each in (image, exact))
+    displayed, exact_displayed = (to_display(each, display.transform) for each in (image, exact))
     reference = exact.astype(np.float64)
     return PixelErrors(
         is_surface * color_difference(displayed, exact_displayed),

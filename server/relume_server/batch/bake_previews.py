@@ -49,5 +49,5 @@ def paint_thumbnail(
     look = looks.validate(transfer.default_look, transfer.default_look)
     image = downsample(context.library.render_small(transfer, view.name, look, width), size)
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_image(file, image, look.display.exposure, look.display.tone_map)
+    write_image(file, image, look.display.transform)
     return {}

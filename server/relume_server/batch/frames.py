@@ -68,7 +68,7 @@ def paint_frame(
         size = render_request.size or (view.width, view.height)
         _export(target, render, look, context, render_request, camera or view.camera, size, scene_name, report)
     else:
-        write_image(target, render(look, report), look.display.exposure, look.display.tone_map)
+        write_image(target, render(look, report), look.display.transform)
     return {}
 
 

@@ -228,7 +228,7 @@ def _write_comparison(folder: Path, frame: F32, estimate: Estimate, is_method_on
 
 def _write_reference(folder: Path, estimate: Estimate, is_method_only: bool, display: Any) -> None:
     path = folder / f"{_prefix(is_method_only)}reference.png"
-    write_image(path, estimate.mean, display.exposure, display.tone_map)
+    write_image(path, estimate.mean, display.transform)
 
 
 def _prefix(is_method_only: bool) -> str:

@@ -22,6 +22,7 @@ from relume.brdf.texture_slots import IMAGES
 from relume.core.errors import RelumeError
 from relume.core.folder_size import folder_bytes
 from relume.imported_materials.material_store import STORE as IMPORTED
+from relume.luts.lut_store import LUTS
 from relume_server.auth.quotas import OwnedKind, Quotas
 from relume_server.auth.reservations import MAX_CONCURRENT_IMPORTS, Reservation
 from relume_server.io.fair_slots import Slots
@@ -33,6 +34,7 @@ from relume_worker.paths import (
     environments_path,
     images_path,
     imported_materials_path,
+    luts_path,
     materials_path,
     scene_path,
 )
@@ -47,6 +49,7 @@ MAX_SUMMARY_BYTES = 64 << 20
 _STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
     "environment": (ENVIRONMENTS, environments_path, "environment"),
     "image": (IMAGES, images_path, "image"),
+    "lut": (LUTS, luts_path, "lut"),
     "material": (MATERIALS, materials_path, "material"),
     "imported": (IMPORTED, imported_materials_path, "imported"),
 }

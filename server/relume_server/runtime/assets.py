@@ -12,7 +12,15 @@ from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
 from relume.imported_materials.material_store import STORE as IMPORTED
-from relume_worker.paths import btfs_path, environments_path, images_path, imported_materials_path, materials_path
+from relume.luts.lut_store import LUTS
+from relume_worker.paths import (
+    btfs_path,
+    environments_path,
+    images_path,
+    imported_materials_path,
+    luts_path,
+    materials_path,
+)
 
 
 def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
@@ -23,6 +31,7 @@ def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
         (BTFS, btfs_path(data_dir)),
         (ENVIRONMENTS, environments_path(data_dir)),
         (IMAGES, images_path(data_dir)),
+        (LUTS, luts_path(data_dir)),
     ]
 
 

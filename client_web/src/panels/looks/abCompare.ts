@@ -11,7 +11,7 @@ import { stage } from "../../render/renderStage";
 import type { Look } from "../../protocol";
 import { isLookFiltered } from "../../state/visibility/activeFilters";
 import { connection } from "../../state/connection";
-import { isDisplayFrozen, isReferenceShown, wipe } from "../../state/display";
+import { difference, isDisplayFrozen, isReferenceShown, wipe } from "../../state/display";
 import { isFrameExact } from "../../state/fidelity";
 import { defaultLook, look } from "../../state/look";
 import { filmstripOpen } from "../../state/panels";
@@ -110,7 +110,7 @@ effect(() => {
 // a view that was hidden when A was stored has no image of A yet
 effect(() => {
   const a = sideA.value;
-  const isCompared = wipe.value.isOn || isReferenceShown.value;
+  const isCompared = wipe.value.isOn || isReferenceShown.value || difference.value !== "off";
   if (a === null || !isCompared || !isFrameExact.value || isDisplayFrozen.value || connection.value !== "open") return;
   if (stage.displayed.some((image) => image.reference === null)) void storeLookAsA(a.look, a.label);
 });

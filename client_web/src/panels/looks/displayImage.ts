@@ -1,27 +1,27 @@
 /** Images made on the client: thumbnails and PNG export. Same tone mapping as the canvas. */
 import { decodeRgb9e5 } from "../../render/color/rgb9e5";
-import { toDisplay } from "../../render/color/tonemap";
+import { toDisplay, type DisplayTransform } from "../../render/color/tonemap";
 import type { PixelBuffer } from "../../render/pixels";
 import type { Look, Rgb } from "../../protocol";
-import { displayedToneMap } from "../../state/color";
+import { transformOf } from "../../state/color";
 
 const THUMBNAIL_WIDTH = 144;
 const TAPS = 2;
 
 type Display = Look["display"];
 
-function writePixel(image: ImageData, index: number, radiance: Rgb, display: Display, alpha = 255): void {
-  const displayColor = toDisplay(radiance, display.exposure, displayedToneMap(display.tone_map));
+function writePixel(image: ImageData, index: number, radiance: Rgb, transform: DisplayTransform, alpha = 255): void {
+  const displayColor = toDisplay(radiance, transform);
   image.data.set([...displayColor.map((v) => Math.round(255 * v)), alpha], 4 * index);
 }
 
 /** The whole image as displayed. `alpha`: coverage per pixel, premultiplied into the radiance; null: opaque. */
 export function renderDisplay(pixels: PixelBuffer, alpha: Uint8Array | null, display: Display): ImageData {
-  const image = new ImageData(pixels.width, pixels.height);
+  const [image, transform] = [new ImageData(pixels.width, pixels.height), transformOf(display)];
   pixels.encoded.forEach((word, i) => {
     const covers = alpha?.[i] ?? 255;
     const foreground = decodeRgb9e5(word).map((v) => (255 * v) / Math.max(1, covers)) as Rgb;
-    writePixel(image, i, foreground, display, covers);
+    writePixel(image, i, foreground, transform, covers);
   });
   return image;
 }
@@ -48,9 +48,10 @@ function toCanvas(image: ImageData): HTMLCanvasElement {
 export function renderThumbnail(pixels: PixelBuffer, display: Display, width = THUMBNAIL_WIDTH): string {
   const step = pixels.width / width;
   const image = new ImageData(width, Math.max(1, Math.round(pixels.height / step)));
+  const transform = transformOf(display);
   for (let y = 0; y < image.height; y++) {
     for (let x = 0; x < image.width; x++)
-      writePixel(image, y * image.width + x, boxSample(pixels, x, y, step), display);
+      writePixel(image, y * image.width + x, boxSample(pixels, x, y, step), transform);
   }
   return toCanvas(image).toDataURL("image/jpeg", 0.85);
 }

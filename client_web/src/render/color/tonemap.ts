@@ -1,6 +1,7 @@
 /** Linear Rec. 709 radiance to sRGB-encoded display values in [0, 1], as in the shader, for pixel probe and export. */
 import type { Rgb } from "../../protocol";
-import { sampleLut, type LutTable } from "./lutTable";
+import { sampleDisplayLut, sampleLut, type LutTable } from "./lutTable";
+import { transformColor, type Matrix } from "./whiteBalance";
 
 export const TONE_MAPS = [
   { name: "agx", label: "AgX" },
@@ -10,6 +11,15 @@ export const TONE_MAPS = [
 
 /** A display transform: a tone map, or the table of a view. */
 export type DisplayedToneMap = (typeof TONE_MAPS)[number]["name"] | LutTable;
+
+/** Conversion of radiance to display values. */
+export interface DisplayTransform {
+  /** Exposure times white balance, for linear Rec. 709. */
+  matrix: Matrix;
+  toneMap: DisplayedToneMap;
+  /** Display LUT after the tone map. */
+  lut: LutTable | null;
+}
 
 const clamp01 = (x: number) => Math.min(1, Math.max(0, x));
 
@@ -59,9 +69,14 @@ function filmic(x: number): number {
   return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-/** Display values of a radiance: exposure in stops, then tone map and sRGB curve, or a view. */
-export function toDisplay(radiance: Rgb, exposure: number, toneMap: DisplayedToneMap): Rgb {
-  const exposed = radiance.map((v) => v * 2 ** exposure) as Rgb;
+/** Display values of a radiance: white balance and exposure, then tone map and sRGB curve or a view, then a LUT. */
+export function toDisplay(radiance: Rgb, { matrix, toneMap, lut }: DisplayTransform): Rgb {
+  const exposed = transformColor(matrix, radiance).map((v) => Math.max(0, v)) as Rgb;
+  const display = applyToneMap(exposed, toneMap);
+  return lut === null ? display : sampleDisplayLut(lut, display);
+}
+
+function applyToneMap(exposed: Rgb, toneMap: DisplayedToneMap): Rgb {
   if (typeof toneMap !== "string") return sampleLut(toneMap, exposed);
   if (toneMap === "agx") return agx(exposed);
   if (toneMap === "filmic") return exposed.map((v) => srgbEncode(filmic(v))) as Rgb;

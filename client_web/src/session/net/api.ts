@@ -14,6 +14,7 @@ import type {
   ZernikeFitRequest,
   Look,
   LooksBody,
+  LutBody,
   LooksRequest,
   MaterialBody,
   MaterialMapBody,
@@ -166,6 +167,14 @@ export const getColor = () => getJson<ColorBody>("/api/color");
 export async function getLut(config: string, { display, view }: OcioView): Promise<ArrayBuffer> {
   const query = new URLSearchParams({ display, view });
   return (await request(`/api/color/${encodeURIComponent(config)}/lut?${query}`)).arrayBuffer();
+}
+/** Display LUTs. */
+export const listLuts = () => getJson<LutBody[]>("/api/luts");
+const lutPath = (name: string) => `/api/luts/${encodeURIComponent(name.replace(/^lut:/, ""))}`;
+export const getLutTable = async (name: string): Promise<ArrayBuffer> =>
+  (await request(`${lutPath(name)}/table`)).arrayBuffer();
+export async function deleteLut(name: string): Promise<void> {
+  await request(lutPath(name), { method: "DELETE" });
 }
 export const listImages = () => getJson<ImageBody[]>("/api/images");
 export async function deleteImage(id: string): Promise<void> {

@@ -6,6 +6,7 @@ import type {
   ImageBody,
   ImportedBody,
   ImportOptions,
+  LutBody,
   MeasuredBody,
   SceneBody,
 } from "../../protocol";
@@ -68,6 +69,13 @@ export function uploadImage(file: File, progress: (fraction: number) => void): P
   const form = new FormData();
   form.append("image", file);
   return postForm("/api/images", form, progress) as Promise<ImageBody>;
+}
+
+/** Upload a display LUT, named after its file. */
+export function uploadLut(file: File, progress: (fraction: number) => void): Promise<LutBody> {
+  const form = new FormData();
+  form.append("lut", file);
+  return postForm("/api/luts", form, progress) as Promise<LutBody>;
 }
 
 /** Upload a measured BRDF; the library lists it under its file name. */

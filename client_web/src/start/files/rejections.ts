@@ -37,7 +37,7 @@ export function editorRejection(files: readonly DroppedFile[]): string {
   const isForStart = files.some(isSceneFile);
   const otherwise = isForStart
     ? "Import scenes on the start page. For a BTF in a ZIP, drop it on the Library."
-    : "HDRIs: HDR or EXR. Textures: PNG, JPG or WebP. One look or light mix: JSON. Measured materials: drop them on the Library.";
+    : "HDRIs: HDR or EXR. Textures: PNG, JPG or WebP. One LUT: CUBE. One look or light mix: JSON. Measured materials: drop them on the Library.";
   return `Can't use ${listFileNames(files)} here. ${rejectionReason(files, otherwise)}`;
 }
 

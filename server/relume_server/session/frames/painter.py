@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.core.errors import ParameterError
+from relume.image_io.display_transform import to_display
 from relume.image_io.downsample import downsample
-from relume.image_io.tone_mapping import tone_map
 from relume.image_io.write_image import to_bytes
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look.model import DisplayLook
@@ -274,9 +274,9 @@ def encode_png(picture: Picture, display: DisplayLook) -> bytes:
 
 def _displayed(image: NDArray[Any], display: DisplayLook, *, use_table: bool) -> NDArray[Any]:
     try:
-        return to_bytes(tone_map(image, display.exposure, display.tone_map, use_table=use_table))
+        return to_bytes(to_display(image, display.transform, use_table=use_table))
     except ParameterError:  # the server lacks the OpenColorIO view: the editor reports it, and shows this
-        return to_bytes(tone_map(image, display.exposure, "agx"))
+        return to_bytes(to_display(image, replace(display.transform, tone_map="agx")))
 
 
 def encode_highlight(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:

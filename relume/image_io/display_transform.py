@@ -1,0 +1,58 @@
+"""Conversion of linear radiance to display values: white balance, exposure, tone map or view, and a display LUT."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
+from relume.image_io.ocio.view import OcioView
+from relume.image_io.tone_mapping import MAX_RADIANCE, tone_map
+from relume.image_io.white_balance import NEUTRAL_TEMPERATURE, balance_matrix
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class DisplayTransform:
+    """Settings of the conversion.
+
+    Attributes:
+        exposure: stops. tone_map: one of TONE_MAPS, or a view of the active OpenColorIO config.
+        temperature, tint: the light that shows as white, as in `balance_matrix`.
+        lut: display values by display values, as from `read_cube`; None: no LUT.
+    """
+
+    exposure: float = 0.0
+    tone_map: str | OcioView = "agx"
+    temperature: float = NEUTRAL_TEMPERATURE
+    tint: float = 0.0
+    lut: Shaped[NDArray[np.uint16], "N N N 3"] | None = None
+
+
+def to_display(
+    image: Shaped[F32, "height width 3"], transform: DisplayTransform, *, use_table: bool = False
+) -> Shaped[F32, "height width 3"]:
+    """Convert linear radiance to display values in [0, 1].
+
+    Args:
+        image: linear Rec. 709; negative values and NaN become black. transform: the settings.
+        use_table: as in `tone_map`.
+    Raises:
+        ParameterError, ShapeMismatchError: as `tone_map` does.
+    """
+    is_neutral = (transform.temperature, transform.tint) == (NEUTRAL_TEMPERATURE, 0.0)
+    balanced = image if is_neutral else _balanced(image, transform)
+    display = tone_map(balanced, transform.exposure, transform.tone_map, use_table=use_table)
+    if transform.lut is not None:
+        from relume.image_io.ocio.sampling import apply_display_lut  # compiled
+
+        apply_display_lut(transform.lut, display.reshape(-1, 3))
+    return display
+
+
+def _balanced(image: F32, transform: DisplayTransform) -> F32:
+    matrix = balance_matrix(transform.temperature, transform.tint).astype(np.float32)
+    return np.asarray(np.clip(np.nan_to_num(image, nan=0.0), 0, MAX_RADIANCE) @ matrix.T)
