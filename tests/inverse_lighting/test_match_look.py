@@ -11,6 +11,7 @@ from PIL import Image
 from session_edits import make_look
 
 from relume.core.errors import EditError, SceneError
+from relume.image_io.display_transform import DisplayTransform, to_display
 from relume.image_io.tone_mapping import tone_map
 from relume.image_io.write_image import png_bytes, to_bytes, write_image
 from relume.inverse_lighting.match_look import MatchRequest, match_look
@@ -139,6 +140,15 @@ def test_clipped_and_transparent_pixels_have_no_weight(gathered):
     expected[0, 0] = expected[1, 1] = 0.0
     np.testing.assert_array_equal(target.weights, expected)
     np.testing.assert_allclose(target.radiance[2, 2], 0.21586 / 2**0.5, rtol=1e-3)
+
+
+def test_white_balance_of_the_display_is_removed(gathered):
+    display = look_of(gathered).display.model_copy(update={"temperature": 3200.0, "tint": 12.0})
+    transform = DisplayTransform(display.exposure, "agx", display.temperature, display.tint)
+    radiance = np.broadcast_to(np.array([0.3, 0.2, 0.12], np.float32), (4, 4, 3))
+    shown = to_bytes(to_display(radiance, transform))
+    target = read_reference(png_bytes(shown), display, (4, 4))
+    np.testing.assert_allclose(target.radiance, radiance, rtol=0.04)
 
 
 @pytest.mark.parametrize(("size", "columns"), [((8, 4), slice(2, 6)), ((4, 4), slice(0, 4))])
