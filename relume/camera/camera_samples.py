@@ -104,8 +104,9 @@ class CameraSetup:
             origins: of each ray (n, 3); None: the camera.
         """
         self.check_canceled()
+        origin = self._origin if origins is None else origins
         return trace_layers(
-            self.geometry, self.scene.materials, self._origin if origins is None else origins, directions, alpha_sample, self.pixel_angle,
+            self.geometry, self.scene.materials, origin, directions, alpha_sample, self.pixel_angle,
             traces_mirrors=self.traces_mirrors, facets=facets, start=near_distances(self.camera, directions),
         )  # fmt: skip
 

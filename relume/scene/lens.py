@@ -49,6 +49,11 @@ class Lens:
         blades = {"blades": self.blades} if self.blades else {}
         return {"radius": self.radius, "focus_distance": self.focus_distance} | blades
 
+    def scaled(self, factor: float) -> Lens:
+        """The lens in a scene that is scaled by a factor, within the limits of `make_lens`."""
+        focus_distance = min(max(factor * self.focus_distance, MIN_FOCUS_DISTANCE), MAX_FOCUS_DISTANCE)
+        return Lens(min(factor * self.radius, MAX_RADIUS), focus_distance, self.blades)
+
     def circle_of_confusion(self, depth: Shaped[NDArray[np.floating], " n"]) -> Shaped[F64, " n"]:
         """Diameter of the image of a point, on the image plane at unit distance. depth: meters, may be infinite"""
         return np.asarray(2 * self.radius * np.abs(1 / np.asarray(depth, np.float64) - 1 / self.focus_distance))

@@ -96,7 +96,7 @@ def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> Sha
 
 
 def read_ray_origins(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n 3"]:
-    """Read the origins of view directions: the camera or a point of its lens, or the last surface that changed the path.
+    """Read the origins of view directions: the camera, a point of its lens, or the last surface on the path.
 
     Args:
         store: an open store. k: index of the view. start, stop: rows of its arrays.
