@@ -163,7 +163,7 @@ def teapot_passes(kind: str, roughness: float, tiny: bool) -> F32:
         kind, roughness, tiny: as in `measure`.
     """
     scene, sizes = built_in("still_life"), Sizes.choose(tiny)
-    bsdfs, wood = describe_materials(scene, kind, roughness), wood_image(scene)
+    bsdfs, wood = [_describe_material(scene, mesh.material, kind, roughness) for mesh in scene.meshes], _wood(scene)
     rows, columns = _bound(find_teapot(tiny))
     crop = [columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start]
     job = make_job(bsdfs)
@@ -191,15 +191,9 @@ def make_job(bsdfs: list[dict[str, Any]]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def wood_image(scene: Scene) -> dict[str, F32]:
-    """Images that `describe_materials` names."""
+def _wood(scene: Scene) -> dict[str, F32]:
     tray = next(material for material in scene.materials if material.name == "Tray")
     return {"wood": tray.textures["diffuse"].pixels}
-
-
-def describe_materials(scene: Scene, kind: str, roughness: float) -> list[dict[str, Any]]:
-    """Descriptions for Mitsuba of the still life's meshes. kind, roughness: of the teapot, as in `measure`"""
-    return [_describe_material(scene, mesh.material, kind, roughness) for mesh in scene.meshes]
 
 
 def _describe_material(scene: Scene, index: int, kind: str, roughness: float) -> dict[str, Any]:

@@ -241,7 +241,12 @@ def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:
 
 
 def stratum_alpha_samples(pixel: NDArray[np.int64], strata: NDArray[np.number], num_strata: int) -> F32:
-    """Alpha samples of p pixels, whose rays are in given strata. strata: (n,) or (p, n). (p · n,)"""
+    """Alpha samples of the rays of p pixels, in given strata. (p · n,)
+
+    Args:
+        pixel: row-major indices. strata: stratum of each ray, for all pixels (n,) or each (p, n).
+        num_strata: their number.
+    """
     offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # without it, eighths would be visible as steps
     offset = (np.floor(NUM_OFFSETS * offset) + 0.5) / NUM_OFFSETS
     return np.asarray((strata + offset) / num_strata, np.float32).ravel()

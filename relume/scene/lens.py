@@ -64,7 +64,13 @@ class Lens:
 
 
 def make_lens(radius: float, focus_distance: float, blades: int = 0) -> Lens:
-    """Validate a lens; see `Lens`. Raises ParameterError: a value is out of range."""
+    """Validate a lens.
+
+    Args:
+        radius, focus_distance, blades: see `Lens`.
+    Raises:
+        ParameterError: a value is out of range.
+    """
     if not 0 < radius <= MAX_RADIUS:
         raise ParameterError("radius", radius, f"an aperture of more than 0 and at most {MAX_RADIUS:g} m, or no lens")
     if not MIN_FOCUS_DISTANCE <= focus_distance <= MAX_FOCUS_DISTANCE:
