@@ -70,7 +70,7 @@ def trace_lens_tile(setup: CameraSetup, tile: ImageTile, max_rays: int) -> tuple
     padded, pixel = tile.padded(setup.size), tile.pixels(setup.size)
     blur, num_traced = _find_blur(setup, padded.pixels(setup.size))
     largest_blur = maximum_filter(blur.reshape(padded.height, padded.width), 3).ravel()
-    num_rays = _rays_per_pixel(tile.crop_from(padded, largest_blur), max_rays)
+    num_rays = _rays_per_pixel(np.asarray(tile.crop_from(padded, largest_blur), np.float64), max_rays)
     groups = list[MergedRays]()
     for num in np.unique(num_rays).tolist():
         pixels = pixel[num_rays == num]

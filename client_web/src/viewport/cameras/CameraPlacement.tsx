@@ -265,13 +265,7 @@ function PlacementView({ scene, bounds, first, overview, interior, firstLens, na
         <StopAtWalls title="The camera stops at surfaces" />
       </div>
       <LensSliders orbit={orbit} bounds={bounds} change={change} />
-      <DepthOfField
-        lens={lens}
-        distance={orbit.distance}
-        focuses={focuses}
-        onChange={setLens}
-        onFocuses={setFocuses}
-      />
+      <DepthOfField lens={lens} distance={orbit.distance} focuses={focuses} onChange={setLens} onFocuses={setFocuses} />
       <div class="placement-keep">
         <label for={field}>Name</label>
         <input
