@@ -34,6 +34,7 @@ def find_document(name: str) -> str:
                 "export.",
                 "glass.",
                 "roughness.",
+                "lens.",
                 "mirror.",
                 "sharp.peak",
                 "sharp.rmse",

@@ -83,14 +83,16 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
 
     Args:
         folder: folder of scene.npz.
-        job: content of job.json: size, "crop", sampler, emitters, integrator, by default of direct light; "yfov", and
-            names of the arrays of the "camera" and the "environment", by default those.
+        job: content of job.json: size, "crop", sampler, emitters, integrator, by default of direct light; "yfov",
+            "lens" with the parameters of a thin lens, and names of the arrays of the "camera" and the "environment",
+            by default those.
         bsdfs: descriptions, one per mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
     transform = mi.ScalarTransform4f
     sensor = {
-        "type": "perspective",
+        "type": "thinlens" if "lens" in job else "perspective",
+        **job.get("lens", {}),
         "fov": float(np.degrees(job["yfov"])),
         "fov_axis": "y",
         "to_world": transform((arrays[job.get("camera", "camera")] @ np.diag([-1.0, 1.0, -1.0, 1.0])).tolist()),

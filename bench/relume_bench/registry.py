@@ -274,6 +274,7 @@ GROUPS = (
         tuple(f"sharp.{kind}_rmse_{r}" for r in (0.02, 0.05, 0.1, 0.2, 0.3) for kind in ("static", "moving")),
     ),
     Group("relume_bench.sharp_edits", ("sharp.clean_s", "sharp.drag_fps")),
+    Group("relume_bench.lens", ("lens.rmse",)),
     Group("relume_bench.mirror", ("mirror.rmse", "mirror.sharp_rmse")),
     Group(
         "relume_bench.estimators",

@@ -42,7 +42,8 @@ def bake(
     camera: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE.json", help='New view from a camera: {"name", "to_world": 16 numbers, "yfov": degrees}.'
+            metavar="FILE.json",
+            help='New view from a camera: {"name", "to_world": 16 numbers, "yfov": degrees, perhaps "lens"}.',
         ),
     ] = None,
     size: Size = None,

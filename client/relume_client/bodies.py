@@ -90,6 +90,7 @@ class CameraBody(TypedDict):
     to_world: Sequence[float]
     yfov: float
     near: NotRequired[float]
+    lens: NotRequired[LensBody | None]
     name: str
 
 
@@ -337,6 +338,14 @@ class InspectAnswer(TypedDict):
     radiance: Sequence[float]
     curve: str | None
     bands: Sequence[Sequence[float]] | None
+
+
+class LensBody(TypedDict):
+    """Depth of field: `radius` of the aperture and depth that is sharp, meters; `blades` of a polygon, 0: round."""
+
+    radius: float
+    focus_distance: float
+    blades: NotRequired[int]
 
 
 class LightGroupLook(TypedDict):

@@ -59,6 +59,7 @@ export interface CameraBody {
   to_world: number[];
   yfov: number;
   near?: number;
+  lens?: LensBody | null;
   name: string;
 }
 
@@ -161,6 +162,13 @@ export interface InspectMessage {
   view?: string | null;
   x: number;
   y: number;
+}
+
+/** Depth of field: `radius` of the aperture and depth that is sharp, meters; `blades` of a polygon, 0: round. */
+export interface LensBody {
+  radius: number;
+  focus_distance: number;
+  blades?: number;
 }
 
 /** Request the look of each frame of an animation; `view`: of the `path`. */
@@ -437,6 +445,7 @@ export interface CameraEntry {
   to_world: number[];
   yfov: number;
   near: number;
+  lens: LensBody | null;
   name: string;
   is_placed: boolean;
 }

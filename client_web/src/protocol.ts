@@ -26,6 +26,7 @@ export type {
   FrameHeader,
   FreeCameraError,
   HelloMessage,
+  LensBody,
   AlbedoBody,
   ZernikeFitBody,
   ZernikeFitRequest,

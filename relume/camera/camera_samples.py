@@ -90,12 +90,23 @@ class CameraSetup:
         at_x, at_y = ((a[:, None] + positions[:, k]).astype(np.float32).ravel() for k, a in enumerate((x, y)))
         return camera_directions(self.camera, self.size, at_x, at_y)
 
-    def _trace_layers(
-        self, directions: F32, alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE, facets: F64 | None = None
+    def trace_layers(
+        self,
+        directions: F32,
+        alpha_sample: F32 | np.float32 = STOP_AT_OPAQUE,
+        facets: F64 | None = None,
+        origins: F32 | None = None,
     ) -> list[TransparencyLayer]:
+        """Trace rays of the camera.
+
+        Args:
+            directions, alpha_sample, facets: see `relume.camera.transparency_layers.trace_layers`.
+            origins: of each ray (n, 3); None: the camera.
+        """
         self.check_canceled()
+        origin = self._origin if origins is None else origins
         return trace_layers(
-            self.geometry, self.scene.materials, self._origin, directions, alpha_sample, self.pixel_angle,
+            self.geometry, self.scene.materials, origin, directions, alpha_sample, self.pixel_angle,
             traces_mirrors=self.traces_mirrors, facets=facets, start=near_distances(self.camera, directions),
         )  # fmt: skip
 
@@ -109,7 +120,7 @@ class CameraSetup:
         def inspect_tile(tile: ImageTile) -> int:
             padded, pixel = tile.padded(self.size), tile.pixels(self.size)
             directions = self._directions(padded.pixels(self.size))
-            layers = self._trace_layers(directions)
+            layers = self.trace_layers(directions)
             visible_counts = sum(
                 np.bincount(layer.ray[layer.is_visible], minlength=len(directions)) for layer in layers
             )
@@ -160,12 +171,12 @@ class CameraSetup:
         pixel = tile.pixels(self.size)
         is_edge, is_frosted = pixels.is_edge[pixel], pixels.is_frosted[pixel]
         interior, edges, frosted = pixel[~is_edge], pixel[is_edge & ~is_frosted], pixel[is_frosted]
-        interior_layers = self._trace_layers(self._directions(interior))
-        edge_layers = self._trace_layers(
+        interior_layers = self.trace_layers(self._directions(interior))
+        edge_layers = self.trace_layers(
             self._directions(edges, positions), _stratified_alpha_samples(edges, len(positions))
         )
         frosted_positions = np.tile(positions, (_FACETS_PER_POSITION, 1))
-        frosted_layers = self._trace_layers(
+        frosted_layers = self.trace_layers(
             self._directions(frosted, frosted_positions),
             np.repeat(STOP_AT_OPAQUE, len(frosted) * len(frosted_positions)),
             stratified_facets(frosted, self.size[0], len(frosted_positions)),
@@ -206,16 +217,36 @@ def stratified_facets(pixel: NDArray[np.int64], width: int, num: int) -> Shaped[
     Args:
         pixel: row-major indices. width: width of the image. num: rays of each pixel, a power of two.
     """
+    return sobol_points(pixel, width, num, 2 * _FACETS_PER_RAY).reshape(-1, _FACETS_PER_RAY, 2)
+
+
+def sobol_points(
+    pixel: Shaped[NDArray[np.int64], " p"], width: int, num: int, num_dimensions: int
+) -> Shaped[F64, "p num dimensions"]:
+    """Return a net of points in [0, 1) for the rays of each pixel; those of any 4 × 4 pixels are one, too.
+
+    Args:
+        pixel, width, num: see `stratified_facets`. num_dimensions: of the points.
+    """
     side = FROST_PERIOD
-    points = Sobol(2 * _FACETS_PER_RAY, scramble=False).random(side**2 * num) + 0.5 / (side**2 * num)
+    points = Sobol(num_dimensions, scramble=False).random(side**2 * num) + 0.5 / (side**2 * num)
     y, x = np.divmod(pixel, width)
-    chosen = points.reshape(side**2, num, _FACETS_PER_RAY, 2)[y % side * side + x % side]
-    return np.asarray(chosen.reshape(-1, _FACETS_PER_RAY, 2))
+    return np.asarray(points.reshape(side**2, num, num_dimensions)[y % side * side + x % side])
 
 
 def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:
     """Stratified alpha samples of the rays of p pixels, so that coverage is exact on average. (p · num,)"""
     order = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # decorrelated from the rows of the positions
+    return stratum_alpha_samples(pixel, order[order < num], num)
+
+
+def stratum_alpha_samples(pixel: NDArray[np.int64], strata: NDArray[np.number], num_strata: int) -> F32:
+    """Alpha samples of the rays of p pixels, in given strata. (p · n,)
+
+    Args:
+        pixel: row-major indices. strata: stratum of each ray, for all pixels (n,) or each (p, n).
+        num_strata: their number.
+    """
     offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # without it, eighths would be visible as steps
     offset = (np.floor(NUM_OFFSETS * offset) + 0.5) / NUM_OFFSETS
-    return np.asarray((order[order < num] + offset) / num, np.float32).ravel()
+    return np.asarray((strata + offset) / num_strata, np.float32).ravel()

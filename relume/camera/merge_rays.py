@@ -42,7 +42,7 @@ def merge_rays(
     geometry: SceneBuffers,
     layer: TransparencyLayer,
     pixels: Shaped[NDArray[np.int64], " p"],
-    positions: Shaped[NDArray[np.float64], "n 2"] = PATTERNS[0],
+    positions: NDArray[np.float64] = PATTERNS[0],
 ) -> MergedRays:
     """Group similar rays of each pixel of a layer.
 
@@ -50,9 +50,10 @@ def merge_rays(
 
     Args:
         geometry: the triangles. layer: layer of the rays, grouped by pixel. pixels: pixels of the rays.
-        positions: positions of the rays in each pixel.
+        positions: positions of the rays in each pixel (n, 2); or of each pixel's, also on the lens (p, n, 4).
     """
-    num = len(positions)
+    num = positions.shape[-2]
+    positions = np.broadcast_to(positions, (len(pixels), *positions.shape[-2:]))
     shape, visible = (len(pixels), num), layer.visible
     row, is_direct = visible.ray, layer.chain is None
     key, normal, is_hit = np.full(shape, -2), np.zeros((*shape, 3), np.float32), np.zeros(shape, np.bool_)
@@ -86,7 +87,7 @@ def merge_rays(
     pixel, first = np.nonzero(group == np.arange(num))
     is_member = group[pixel] == first[:, None]
     size = is_member.sum(axis=1)
-    representative = pixel * num + _central_position(is_member, size, positions)
+    representative = pixel * num + _central_position(is_member, size, positions[pixel])
     mean = np.einsum("gk,gkc->gc", is_member, transmittance[pixel]) / size[:, None]
     group_layer = visible.rows(np.searchsorted(row, representative))._replace(transmittance=mean.astype(np.float32))
     return MergedRays(pixels[pixel], (size / num).astype(np.float32), group_layer)
@@ -111,8 +112,8 @@ def _central_position(
 
     Args:
         is_member: positions in each group. (groups, n). size: number of members. (groups,)
-        positions: positions of all rays of a pixel. (n, 2)
+        positions: positions of all rays of the group's pixel. (groups, n, dimensions)
     """
-    mean = is_member @ positions / size[:, None]
+    mean = np.einsum("gn,gnk->gk", is_member, positions) / size[:, None]
     squared_distance = np.sum((positions - mean[:, None]) ** 2, axis=-1)
     return np.asarray(np.where(is_member, squared_distance, np.inf).argmin(axis=1), np.int64)

@@ -96,13 +96,13 @@ class RayPaths(NamedTuple):
         return 0 if self.chain is None else self.chain.num_mirrors
 
     @classmethod
-    def from_camera(cls, camera_position: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]) -> RayPaths:
-        """Start the paths of camera rays. directions: unit"""
+    def from_camera(cls, camera_position: F32, directions: Shaped[F32, "n 3"]) -> RayPaths:
+        """Start the paths of camera rays. camera_position: (3,), or (n, 3) on a lens. directions: unit"""
         num = len(directions)
         ones, zeros = np.ones((num, 3), np.float32), np.zeros(num, np.float32)
         return cls(
             np.arange(num),
-            np.reshape(camera_position, (1, 3)),
+            np.reshape(camera_position, (-1, 3)),
             directions,
             ones,
             zeros,

@@ -63,13 +63,13 @@ def morton(pixel: Shaped[NDArray[np.int64], " n"], width: int) -> Shaped[NDArray
     return code
 
 
-def image_tiles(size: tuple[int, int]) -> list[ImageTile]:
-    """Tiles of an image, in Morton order. size: width and height in pixels"""
-    columns, rows = (-(-length // TILE_SIZE) for length in size)
+def image_tiles(size: tuple[int, int], tile_size: int = TILE_SIZE) -> list[ImageTile]:
+    """Tiles of an image, in Morton order. size: width and height in pixels. tile_size: a power of two, pixels"""
+    columns, rows = (-(-length // tile_size) for length in size)
     order = np.argsort(morton(np.arange(columns * rows), columns), kind="stable")
     return [
-        ImageTile(x, y, min(TILE_SIZE, size[0] - x), min(TILE_SIZE, size[1] - y))
+        ImageTile(x, y, min(tile_size, size[0] - x), min(tile_size, size[1] - y))
         for y, x in (
-            (TILE_SIZE * int(row), TILE_SIZE * int(column)) for row, column in (divmod(k, columns) for k in order)
+            (tile_size * int(row), tile_size * int(column)) for row, column in (divmod(k, columns) for k in order)
         )
     ]

@@ -106,7 +106,7 @@ def max_samples(materials: Sequence[Material]) -> int:
 def trace_layers(
     geometry: SceneBuffers,
     materials: Sequence[Material],
-    camera_position: Shaped[F32, " 3"],
+    camera_position: F32,
     directions: Shaped[F32, "n 3"],
     alpha_sample: F32 | np.float32,
     pixel_angle: float = 0.0,
@@ -118,8 +118,8 @@ def trace_layers(
     """Trace camera rays through glass and off mirrors.
 
     Args:
-        geometry: the triangles. materials: materials of the scene. camera_position: origin of the rays.
-        directions: unit. alpha_sample: see `trace_rays`.
+        geometry: the triangles. materials: materials of the scene.
+        camera_position: origin of all rays (3,), or of each (n, 3). directions: unit. alpha_sample: see `trace_rays`.
         pixel_angle: angle of a pixel, radians, to filter textures on mirrors.
         traces_mirrors: add layers of reflections in mirrors.
         facets: two numbers in [0, 1) for each ray and successive glass surface, which choose the facets of frosted

@@ -14,15 +14,18 @@ import io
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import IO, Any
+from functools import partial
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import lookup
-from relume.camera.camera_samples import CameraSetup, EdgePixels
+from relume.camera.camera_samples import CameraSetup
 from relume.camera.external_sort import Column, ExternalSort
+from relume.camera.lens_rays import RAYS_PER_PIXEL, trace_lens_tile
+from relume.camera.lens_rays import TILE_SIZE as LENS_TILE_SIZE
 from relume.camera.merge_rays import PATTERNS, POSITIONS_PER_PIXEL, MergedRays
 from relume.camera.ray_paths import SpecularChain
 from relume.camera.spectral_split import POINTS_PER_BLOCK, SplitColumn, TintedLight, TintSplit, num_tints
@@ -39,6 +42,7 @@ F32 = NDArray[np.float32]
 
 BACKGROUND = 65_535
 _SAMPLES_PER_SIDE = 2048  # limit of samples per pixel times √pixels; a tuft of grass needs 1,600
+_LENS_RATIO = 8  # by which a lens raises it
 _NUM_LEVELS = 256
 
 
@@ -176,16 +180,12 @@ def sample_pixels(
     Returns:
         The columns of `ViewSamples`, of its surface, points and chain, by name; and the number of traced rays.
     """
-    edges, size, materials = (
-        camera_setup.find_edges(smooths=smooths_edges),
-        camera_setup.size,
-        camera_setup.scene.materials,
-    )
-    num_rays, sample_limit = edges.num_rays, view_sample_limit(materials, size[0] * size[1])
-    for positions in PATTERNS:
-        rows, num_traced = _sample_tiles(
-            camera_setup, edges, positions, sample_limit, scratch, {*names, *_REQUIRED_COLUMNS}
-        )
+    size, materials, has_lens = camera_setup.size, camera_setup.scene.materials, camera_setup.camera.lens is not None
+    sample_limit = view_sample_limit(materials, size[0] * size[1], has_lens=has_lens)
+    samplings = _lens_samplings(camera_setup) if has_lens else _edge_samplings(camera_setup, smooths=smooths_edges)
+    num_rays = samplings[0].num_rays
+    for sampling in samplings:
+        rows, num_traced = _sample_tiles(camera_setup, sampling, sample_limit, scratch, {*names, *_REQUIRED_COLUMNS})
         num_rays += num_traced
         if rows is not None:
             break
@@ -197,10 +197,41 @@ def sample_pixels(
     return {name: columns[name] for name in names}, num_rays
 
 
+class _Sampling(NamedTuple):
+    """One of several ways to sample the tiles of an image.
+
+    Attributes:
+        trace_tile: returns merged rays, the number of those in pixels with several, and the number of traced rays.
+        tiles: of the image. num_single_samples: samples of pixels with one ray. num_rays: rays traced before.
+    """
+
+    trace_tile: Callable[[ImageTile], tuple[MergedRays, int, int]]
+    tiles: list[ImageTile]
+    num_single_samples: int
+    num_rays: int
+
+
+def _edge_samplings(setup: CameraSetup, *, smooths: bool) -> list[_Sampling]:
+    """Samplings of a camera without a lens, with ever fewer rays in edge pixels."""
+    edges, tiles = setup.find_edges(smooths=smooths), image_tiles(setup.size)
+    trace_tile = setup.trace_tile
+    return [
+        _Sampling(
+            partial(trace_tile, pixels=edges, positions=positions), tiles, edges.num_single_samples, edges.num_rays
+        )
+        for positions in PATTERNS
+    ]
+
+
+def _lens_samplings(setup: CameraSetup) -> list[_Sampling]:
+    """Samplings of a camera with a lens, with ever fewer rays."""
+    tiles = image_tiles(setup.size, LENS_TILE_SIZE)
+    return [_Sampling(partial(trace_lens_tile, setup, max_rays=num), tiles, 0, 0) for num in RAYS_PER_PIXEL]
+
+
 def _sample_tiles(
     camera_setup: CameraSetup,
-    edges: EdgePixels,
-    positions: NDArray[np.float64],
+    sampling: _Sampling,
     sample_limit: int,
     scratch: Callable[[], IO[bytes]],
     names: Collection[str],
@@ -208,20 +239,18 @@ def _sample_tiles(
     """Find samples tile by tile.
 
     Args:
-        camera_setup: the camera. edges: edges of its image. positions: positions of the rays in each edge pixel. (n, 2)
+        camera_setup: the camera. sampling: of its image.
         sample_limit: maximum number of samples. scratch, names: see `sample_pixels`.
     Returns:
         The samples, None if they exceed the limit; and the number of traced rays.
     """
-    rows, num_samples, num_rays = ExternalSort(scratch), edges.num_single_samples, 0
+    rows, num_samples, num_rays = ExternalSort(scratch), sampling.num_single_samples, 0
 
     def process_tile(tile: ImageTile) -> tuple[dict[str, NDArray[Any]], int, int]:
-        rays, num_edge_samples, num_traced = camera_setup.trace_tile(tile, edges, positions)
+        rays, num_edge_samples, num_traced = sampling.trace_tile(tile)
         return _sorted_samples(camera_setup, rays), num_edge_samples, num_traced
 
-    for columns, num_edge_samples, num_traced in map_ordered(
-        process_tile, image_tiles(camera_setup.size), MAX_CONCURRENT_TILES
-    ):
+    for columns, num_edge_samples, num_traced in map_ordered(process_tile, sampling.tiles, MAX_CONCURRENT_TILES):
         num_samples, num_rays = num_samples + num_edge_samples, num_rays + num_traced
         if num_samples > sample_limit:
             return None, num_rays
@@ -229,7 +258,7 @@ def _sample_tiles(
     return rows, num_rays
 
 
-def view_sample_limit(materials: Sequence[Material], num_pixels: int) -> int:
+def view_sample_limit(materials: Sequence[Material], num_pixels: int, *, has_lens: bool = False) -> int:
     """Maximum number of samples of a view: several positions per pixel, times the layers of glass and mirrors.
 
     Edges are lines: twice the resolution has twice as many edge pixels among four times as many pixels. So a large
@@ -237,8 +266,12 @@ def view_sample_limit(materials: Sequence[Material], num_pixels: int) -> int:
 
     Args:
         materials: materials of the scene. num_pixels: number of pixels of the image.
+        has_lens: of the camera; blurred pixels have eight times as many samples.
     """
-    samples_per_pixel = min(max(_SAMPLES_PER_SIDE / math.sqrt(num_pixels), len(PATTERNS[-1])), POSITIONS_PER_PIXEL)
+    per_side, most = (
+        (_LENS_RATIO * _SAMPLES_PER_SIDE, RAYS_PER_PIXEL[0]) if has_lens else (_SAMPLES_PER_SIDE, POSITIONS_PER_PIXEL)
+    )
+    samples_per_pixel = min(max(per_side / math.sqrt(num_pixels), len(PATTERNS[-1])), most)
     return math.ceil(samples_per_pixel * num_pixels) * max_samples(materials)
 
 

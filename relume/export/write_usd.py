@@ -28,7 +28,7 @@ from relume.scene_io.usd.layers import INSTALL
 
 VARIANT_SET = "look"
 _ROOT = "/Scene"
-_FOCAL_LENGTH = 50.0
+_FOCAL_LENGTH = 0.5  # 50 mm in tenths of a meter
 _DEFAULT_ASPECT = 4 / 3
 _CLIPPING = 1e-3, 1e6  # meters
 _POINT_RADIUS = 1e-3
@@ -235,6 +235,9 @@ class _StageWriter:
         prim.CreateVerticalApertureAttr(height)
         prim.CreateHorizontalApertureAttr(height * (camera.aspect or _DEFAULT_ASPECT))
         prim.CreateClippingRangeAttr(Gf.Vec2f(max(camera.near, _CLIPPING[0]), _CLIPPING[1]))
+        if camera.lens is not None:
+            prim.CreateFStopAttr(_FOCAL_LENGTH / (20 * camera.lens.radius))
+            prim.CreateFocusDistanceAttr(camera.lens.focus_distance)
         _transform(prim, camera.to_world)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from relume.camera.lens_rays import PILOT_RAYS, RAYS_PER_PIXEL
 from relume.camera.merge_rays import PATTERNS, POSITIONS_PER_PIXEL
 from relume.camera.spectral_split import max_tint_rays, num_tints
 from relume.camera.tiling import TILE_SIZE
@@ -40,13 +41,21 @@ _LIGHT_BYTES = 112  # per light triangle in the store: nodes, direction, power, 
 def max_view_samples(scene: Scene, recipe: Recipe) -> int:
     """Maximum number of view samples of one view."""
     width, height = recipe.size
-    return view_sample_limit(scene.materials, width * height)
+    return view_sample_limit(scene.materials, width * height, has_lens=has_lens(scene, recipe))
+
+
+def has_lens(scene: Scene, recipe: Recipe) -> bool:
+    """True if any camera of a recipe has a lens."""
+    return any(camera.lens is not None for camera in scene.cameras if camera.name in recipe.views)
 
 
 def num_camera_rays(scene: Scene, recipe: Recipe) -> int:
     """Number of camera rays of all views: one per pixel, then all positions of each pixel, and all layers."""
     width, height = recipe.size
-    rays_per_pixel = 2 + sum(map(len, PATTERNS))  # patterns with too many samples are retried with fewer
+    # patterns with too many samples are retried with fewer
+    rays_per_pixel = 2 + sum(map(len, PATTERNS))
+    if has_lens(scene, recipe):
+        rays_per_pixel = len(RAYS_PER_PIXEL) * PILOT_RAYS + sum(RAYS_PER_PIXEL)
     return rays_per_pixel * width * height * len(recipe.views) * max_layers(scene.materials)
 
 
@@ -101,7 +110,8 @@ def num_triangles(scene: Scene) -> int:
 def supersampling_ratio(scene: Scene, recipe: Recipe) -> float:
     """Ratio of samples at all positions of all pixels to the planned samples: work scales with the number of pixels."""
     num_pixels = recipe.size[0] * recipe.size[1]
-    return POSITIONS_PER_PIXEL * num_pixels * max_samples(scene.materials) / max_view_samples(scene, recipe)
+    positions = RAYS_PER_PIXEL[0] if has_lens(scene, recipe) else POSITIONS_PER_PIXEL
+    return positions * num_pixels * max_samples(scene.materials) / max_view_samples(scene, recipe)
 
 
 def estimated_work(scene: Scene, num_rays: float, ray_ns: float, triangle_us: float) -> float:

@@ -20,6 +20,7 @@ reads the finished bake.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -87,7 +88,7 @@ class ProbesMethod:
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
         """Return upper bounds, from the recipe alone."""
         plan_estimates.check_gathering(recipe, _MAX_REQUESTED_PATCHES)
-        views_plan = self._views.plan(scene, recipe)
+        views_plan = self._views.plan(_without_lenses(scene), recipe)
         if not MIN_PROBES <= recipe.num_probes <= MAX_PROBES:
             raise PlanError(f"{recipe.num_probes} probes were asked for; give {MIN_PROBES} to {MAX_PROBES:,}")
         num_probes = _max_probes(scene, recipe)
@@ -115,7 +116,7 @@ class ProbesMethod:
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """Return the store's attributes."""
         return {
-            **self._views.attributes(scene, recipe),
+            **self._views.attributes(_without_lenses(scene), recipe),
             "gather_seed": int(scene.id[:7], 16),
             "has_sh": True,
             "has_free_camera_error": True,
@@ -271,6 +272,11 @@ def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
         triangles=triangles * 10 + plan_estimates.triangles_bytes(scene) + plan_estimates.tangent_bytes(scene),
         lights=plan_estimates.lights_bytes(scene, recipe),
     )
+
+
+def _without_lenses(scene: Scene) -> Scene:
+    """Return the scene with cameras whose images are sharp everywhere: a free camera has no lens."""
+    return replace(scene, cameras=tuple(replace(camera, lens=None) for camera in scene.cameras))
 
 
 def _max_probes(scene: Scene, recipe: Recipe) -> int:

@@ -17,6 +17,7 @@ triangles, and each view's samples), then "visibility" (rows of each view).
                                                          relume.raytrace.surface_interaction.SurfaceInteraction
     views/<k>/transmittance, camera, is_mirrored, mirror, mirror_cosine, mirror_tint
                                                          of scenes with glass or mirrors: relume.camera.view_samples
+    views/<k>/camera                                     of cameras with a lens, too
     views/<k>/frost                                      of scenes with frosted glass: relume.camera.view_samples
     views/<k>/alpha_sample                               of scenes with tinted glass:
                                                          relume.raytrace.surface_points.SurfacePoints
@@ -56,7 +57,7 @@ from relume.views.store_io import read_alpha_samples
 CHUNK_ROWS = 1024
 MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
-_EMISSION_BYTES, _NORMAL_MAP_BYTES = 12, 4 + 12
+_EMISSION_BYTES, _NORMAL_MAP_BYTES, _ORIGIN_BYTES = 12, 4 + 12, 12
 _LAYER_BYTES = 12 + 12 + 1 + 2 + 4 + MAX_MIRROR_BOUNCES * (2 + 4 + 12)
 _SHARD_ROW_BYTES = 200  # position, normal, and the blocks of the tracer
 _METADATA_BYTES = 1 << 20
@@ -110,6 +111,7 @@ class SampledViews:
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_emission_images(scene) else 0)
         surface_bytes += _NORMAL_MAP_BYTES if _has_normal_maps(scene) else 0
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
+        surface_bytes += _ORIGIN_BYTES if plan_estimates.has_lens(scene, recipe) else 0
         # while samples are sorted, their files exist twice, and no bits yet
         in_store = samples * (surface_bytes + max(bits, surface_bytes)) + plan_estimates.lights_bytes(scene, recipe)
         num_rays = (
@@ -197,7 +199,9 @@ class SampledViews:
         camera = replace(
             camera_setup(scene, self.geometry_of(scene), task.group, recipe.size), check_canceled=store.check_canceled
         )
-        columns, num_rays = sample_pixels(camera, store.scratch, _columns(scene), smooths_edges=self._smooths_edges)
+        columns, num_rays = sample_pixels(
+            camera, store.scratch, _columns(scene, camera.camera), smooths_edges=self._smooths_edges
+        )
         prefix = f"views/{recipe.views.index(task.group)}"
         return TaskOutput({f"{prefix}/{name}": column for name, column in columns.items()}, num_rays, 0.0)
 
@@ -226,11 +230,13 @@ class SampledViews:
             return self._geometry[1]
 
 
-def _columns(scene: Scene) -> list[str]:
-    """Return the names of the stored columns of view samples."""
+def _columns(scene: Scene, camera: Camera) -> list[str]:
+    """Return the names of the stored columns of a camera's view samples."""
     names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
     if has_layers(scene.materials):
         names += ["transmittance", "camera", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
+    elif camera.lens is not None:
+        names.append("camera")
     if has_frost(scene.materials):
         names.append("frost")
     if num_tints(scene.materials):
@@ -291,4 +297,5 @@ def read_targets(store: StoreReader) -> LightTargets:
 def _view_attributes(camera: Camera) -> dict[str, Any]:
     """Return a view's entry in a store's attributes."""
     near = {"near": camera.near} if camera.near else {}
-    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov} | near
+    lens = {"lens": camera.lens.document()} if camera.lens else {}
+    return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov} | near | lens

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from relume.core.errors import Description, ParameterError, count_text
+from relume.scene.lens import Lens, read_lens
 from relume.scene.model import Camera, Scene
 from relume.scene.validate import MAX_METERS
 
 MAX_NAME = 80
 MIN_YFOV, MAX_YFOV = 1.0, 170.0  # degrees
-_FIELDS, _OPTIONAL_FIELD = ("name", "to_world", "yfov"), "near"
+_FIELDS, _OPTIONAL_FIELDS = ("name", "to_world", "yfov"), ("near", "lens")
 # largest allowed deviation from right angles; deviation below which axes are kept as they are
 _ANGLE_TOLERANCE, _RIGID_TOLERANCE = 1e-3, 1e-8
 
@@ -28,25 +29,32 @@ class CustomCamera:
         to_world: camera to world, 16 numbers by row; rigid.
         yfov: vertical field of view, degrees.
         near: distance of the near clipping plane, meters.
+        lens: None: everything is sharp.
     """
 
     name: str
     to_world: tuple[float, ...]
     yfov: float
     near: float = 0.0
+    lens: Lens | None = None
 
     @property
     def camera(self) -> Camera:
         """Convert to a camera of a scene."""
-        return Camera(self.name, np.array(self.to_world).reshape(4, 4), math.radians(self.yfov), near=self.near)
+        return Camera(
+            self.name, np.array(self.to_world).reshape(4, 4), math.radians(self.yfov), near=self.near, lens=self.lens
+        )
 
     def document(self) -> dict[str, Any]:
         """Convert to JSON; the inverse of `read_custom_camera`."""
         near = {"near": self.near} if self.near else {}  # recipes without one keep their identity
-        return {"name": self.name, "to_world": list(self.to_world), "yfov": self.yfov} | near
+        lens = {"lens": self.lens.document()} if self.lens else {}
+        return {"name": self.name, "to_world": list(self.to_world), "yfov": self.yfov} | near | lens
 
 
-def make_custom_camera(name: str, to_world: Sequence[float], yfov: float, near: float = 0.0) -> CustomCamera:
+def make_custom_camera(
+    name: str, to_world: Sequence[float], yfov: float, near: float = 0.0, lens: Lens | None = None
+) -> CustomCamera:
     """Validate a camera that a user placed.
 
     Args:
@@ -54,6 +62,7 @@ def make_custom_camera(name: str, to_world: Sequence[float], yfov: float, near: 
         to_world: camera to world, 16 numbers by row; the camera looks along its -Z. Scale is removed.
         yfov: vertical field of view, degrees.
         near: distance of the near clipping plane, meters; 0: nothing is clipped.
+        lens: made by `make_lens`.
     Raises:
         ParameterError: a value is invalid.
     """
@@ -62,15 +71,15 @@ def make_custom_camera(name: str, to_world: Sequence[float], yfov: float, near: 
         raise ParameterError("yfov", yfov, f"a vertical field of view of {MIN_YFOV:g} to {MAX_YFOV:g} degrees")
     if not (math.isfinite(near) and 0 <= near <= MAX_METERS):
         raise ParameterError("near", near, f"0 to {MAX_METERS:,.0f} m")
-    return CustomCamera(name, _rigid(to_world), float(yfov), float(near))
+    return CustomCamera(name, _rigid(to_world), float(yfov), float(near), lens)
 
 
 def read_custom_camera(document: object) -> CustomCamera:
     """Read the camera of a JSON document. Raises ParameterError."""
-    if not isinstance(document, Mapping) or set(document) - {_OPTIONAL_FIELD} != set(_FIELDS):
-        raise ParameterError("camera", document, "an object with " + ", ".join(_FIELDS) + ", and perhaps near")
+    if not isinstance(document, Mapping) or set(document) - set(_OPTIONAL_FIELDS) != set(_FIELDS):
+        raise ParameterError("camera", document, "an object with " + ", ".join(_FIELDS) + ", and perhaps near or lens")
     name, to_world, yfov = (document[field] for field in _FIELDS)
-    near = document.get(_OPTIONAL_FIELD, 0.0)
+    near, lens = document.get("near", 0.0), document.get("lens")
     if not isinstance(name, str):
         raise ParameterError("name", name, "text")
     if not isinstance(to_world, list) or not all(map(_is_number, to_world)):
@@ -79,7 +88,7 @@ def read_custom_camera(document: object) -> CustomCamera:
         raise ParameterError("yfov", yfov, "a number of degrees")
     if not _is_number(near):
         raise ParameterError("near", near, "a number of meters")
-    return make_custom_camera(name, to_world, yfov, near)
+    return make_custom_camera(name, to_world, yfov, near, None if lens is None else read_lens(lens))
 
 
 def with_cameras(scene: Scene, cameras: Iterable[Camera]) -> Scene:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
 from relume.core.import_warnings import ImporterWarning
+from relume.scene.lens import Lens
 from relume.scene.light_members import LightMembers
 
 F32 = NDArray[np.float32]
@@ -149,6 +150,7 @@ class Camera:
         to_world: camera to world, rigid.
         aspect: width ÷ height from the file, or None. Images may have any other.
         near: distance of the near clipping plane, meters; camera rays begin there, light and shadows do not change.
+        lens: of fixed cameras; None: everything is sharp.
     """
 
     name: str
@@ -156,6 +158,7 @@ class Camera:
     yfov: float
     aspect: float | None = None
     near: float = 0.0
+    lens: Lens | None = None
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from relume.assets.environments.environment import Environment
 from relume.core.errors import NotFoundError, SceneError
 from relume.core.filesystem import atomic_write
 from relume.core.import_warnings import ImporterWarning, warning_of
+from relume.scene.lens import read_lens
 from relume.scene.light_members import LightMembers
 from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
 from relume.scene.validate import check_scene
@@ -194,7 +195,7 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
             }
             for material in scene.materials
         ],
-        "cameras": [{"name": c.name, "to_world": c.to_world.tolist(), "yfov": c.yfov} for c in scene.cameras],
+        "cameras": [_camera_document(camera) for camera in scene.cameras],
         "environment": {"name": scene.environment.name},
         "warnings": [warning.document() for warning in scene.warnings],
     }
@@ -298,11 +299,22 @@ def _assemble_opacity(document: dict[str, Any], alpha: NDArray[Any]) -> Opacity:
     return Opacity(alpha, (str(wrap_u), str(wrap_v)), None if cutoff is None else float(cutoff))
 
 
+def _camera_document(camera: Camera) -> dict[str, Any]:
+    lens = {"lens": camera.lens.document()} if camera.lens else {}  # omitted if empty, as above
+    return {"name": camera.name, "to_world": camera.to_world.tolist(), "yfov": camera.yfov} | lens
+
+
 def _cameras(document: dict[str, Any]) -> list[Camera]:
     camera_documents = document["cameras"]
     aspects = document.get("aspects") or [None] * len(camera_documents)
     return [
-        Camera(str(c["name"]), np.array(c["to_world"], np.float64), float(c["yfov"]), None if a is None else float(a))
+        Camera(
+            str(c["name"]),
+            np.array(c["to_world"], np.float64),
+            float(c["yfov"]),
+            None if a is None else float(a),
+            lens=read_lens(c["lens"]) if "lens" in c else None,
+        )
         for c, a in zip(camera_documents, aspects, strict=True)
     ]
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from relume.assets.environments.environment import Environment
-from relume.core.errors import SceneError
+from relume.core.errors import ParameterError, SceneError
+from relume.scene.lens import make_lens
 from relume.scene.light_members import MAX_MEMBERS
 from relume.scene.model import WRAPS, Camera, Light, Material, Mesh
 
@@ -83,6 +84,11 @@ def check_camera(camera: Camera) -> None:
         raise SceneError(f"camera {camera.name!r} has an invalid position or field of view; set them")
     if not 0 <= camera.near < np.inf:
         raise SceneError(f"camera {camera.name!r} has an invalid near plane; set it to 0 or more meters")
+    if camera.lens is not None:
+        try:
+            make_lens(**vars(camera.lens))
+        except ParameterError as error:
+            raise SceneError(f"camera {camera.name!r} has an invalid lens: {error}") from error
     if not np.allclose(to_world[:3, :3] @ to_world[:3, :3].T, np.eye(3), atol=1e-4):
         raise SceneError(f"camera {camera.name!r} has scale or shear in its transform; remove them")
 

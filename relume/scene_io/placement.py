@@ -103,7 +103,7 @@ def _place_camera(camera: Camera, rotation: F64, meters: float, origin: F64) -> 
     to_world = camera.to_world.copy()
     to_world[:3, :3] = rotation @ to_world[:3, :3]
     to_world[:3, 3] = meters * rotation @ (to_world[:3, 3] - origin)
-    return replace(camera, to_world=to_world)
+    return replace(camera, to_world=to_world, lens=camera.lens and camera.lens.scaled(meters))
 
 
 def _place_light(light: Light, rotation: F64, meters: float, origin: F64) -> Light:

@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.errors import ChunkDamagedError, SceneError, StoreError
+from relume.core.errors import ChunkDamagedError, ParameterError, SceneError, StoreError
 from relume.raytrace.gather_rays import RayPattern, make_pattern
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
+from relume.scene.lens import read_lens
 from relume.scene.model import Camera
 from relume.scene.validate import check_camera
 from relume.store.bake_protocol import StoreReader
@@ -43,9 +44,10 @@ def read_camera(store: StoreReader, k: int) -> Camera:
         attributes = store.attributes["views"][k]
         to_world = np.array(attributes["to_world"], np.float64).reshape(4, 4)
         near = float(attributes.get("near", 0.0))
-        camera = Camera(str(attributes["name"]), to_world, float(attributes["yfov"]), near=near)
+        lens = read_lens(attributes["lens"]) if "lens" in attributes else None
+        camera = Camera(str(attributes["name"]), to_world, float(attributes["yfov"]), near=near, lens=lens)
         check_camera(camera)
-    except (KeyError, TypeError, ValueError, SceneError) as error:
+    except (KeyError, TypeError, ValueError, ParameterError, SceneError) as error:
         raise StoreError(f"view {k} of the store has no camera ({error}); delete the bake, bake again") from error
     return camera
 
@@ -94,14 +96,17 @@ def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> Sha
 
 
 def read_ray_origins(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n 3"]:
-    """Read the origins of view directions: the camera, or the last surface that changed the path; one for all if equal.
+    """Read the origins of view directions: the camera, a point of its lens, or the last surface on the path.
 
     Args:
         store: an open store. k: index of the view. start, stop: rows of its arrays.
+    Returns:
+        One for all if they are equal.
     """
-    if store.attributes.get("has_layers"):
+    camera = read_camera(store, k)
+    if store.attributes.get("has_layers") or camera.lens is not None:
         return np.asarray(store.read(f"views/{k}/camera", start, stop), np.float32)
-    return read_camera(store, k).to_world[None, :3, 3].astype(np.float32)
+    return camera.to_world[None, :3, 3].astype(np.float32)
 
 
 def view_directions(origin: Shaped[F32, "#n 3"], position: Shaped[F32, "n 3"]) -> Shaped[F32, "n 3"]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from relume.core.errors import DiskFullError
 from relume.export import export_images
 from relume.export.export_scene import FORMATS, export_report
 from relume.export.write_usd import write_usd
+from relume.scene.lens import Lens
 from relume.scene.model import Light, Material, Scene
 from relume.scene_io.import_scene import import_scene
 from relume.scene_io.surfaces.to_terms import CoatLayer, PbrSurface
@@ -34,6 +36,7 @@ def test_the_package_is_compliant(tmp_path: Path) -> None:
 
 def test_geometry_cameras_and_lights_are_read_again(tmp_path: Path) -> None:
     scene = sample_scene()
+    scene = replace(scene, cameras=(replace(scene.cameras[0], lens=Lens(0.02, 3.0)),))
     panel = {
         "kind": "rectangle",
         "position": [1.0, 2.0, 3.0],
@@ -62,6 +65,8 @@ def test_geometry_cameras_and_lights_are_read_again(tmp_path: Path) -> None:
     (camera,) = again.cameras
     assert camera.to_world == pytest.approx(scene.cameras[0].to_world)
     assert (camera.yfov, camera.aspect) == pytest.approx((0.7, 1.5), rel=1e-5)
+    assert camera.lens is not None
+    assert (camera.lens.radius, camera.lens.focus_distance) == pytest.approx((0.02, 3.0), rel=1e-5)
     lights = {light.name: light.fields for light in again.lights}
     for light in (*scene.lights[1:], *(Light(name, shape) for name, shape in shapes.items())):
         for key, value in light.fields.items():

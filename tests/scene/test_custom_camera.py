@@ -9,6 +9,7 @@ import pytest
 from relume.core.errors import ParameterError
 from relume.scene.custom_camera import make_custom_camera, read_custom_camera, with_cameras
 from relume.scene.examples.catalog import built_in
+from relume.scene.lens import Lens
 from relume.scene.validate import MAX_METERS
 
 POSE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
@@ -99,3 +100,33 @@ def test_additional_cameras_do_not_change_the_scene_id() -> None:
     assert more.id == scene.id
     assert {camera.name for camera in more.cameras} == {*(camera.name for camera in scene.cameras), "Hero"}
     assert next(camera for camera in more.cameras if camera.name == own).yfov == pytest.approx(math.radians(50))
+
+
+def test_a_lens_is_part_of_the_recipe_and_read_again() -> None:
+    document = {"name": "Hero", "to_world": POSE, "yfov": 40, "lens": {"radius": 0.02, "focus_distance": 1.5}}
+    camera = read_custom_camera(document)
+    assert camera.camera.lens == Lens(0.02, 1.5)
+    assert camera.document()["lens"] == document["lens"]  # type: ignore[index]
+    hexagon = {**document, "lens": {"radius": 0.02, "focus_distance": 1.5, "blades": 6}}
+    assert read_custom_camera(read_custom_camera(hexagon).document()).lens == Lens(0.02, 1.5, 6)
+    assert "lens" not in make_custom_camera("Hero", POSE, 40).document()  # recipes without one keep their identity
+
+
+@pytest.mark.parametrize(
+    ("lens", "text"),
+    [
+        ({"radius": 0, "focus_distance": 1}, "radius is 0"),
+        ({"radius": 11, "focus_distance": 1}, "at most 10 m"),
+        ({"radius": math.nan, "focus_distance": 1}, "radius is nan"),
+        ({"radius": 10**400, "focus_distance": 1}, "at most 10 m"),
+        ({"radius": 0.1, "focus_distance": 0}, "focus_distance is 0"),
+        ({"radius": 0.1, "focus_distance": "near"}, "a number of meters"),
+        ({"radius": 0.1, "focus_distance": 1, "blades": 2}, "3 to 16 blades"),
+        ({"radius": 0.1, "focus_distance": 1, "blades": 5.5}, "a whole number"),
+        ({"radius": 0.1}, "focus_distance"),
+        (["radius"], "an object"),
+    ],
+)
+def test_impossible_lenses_are_rejected(lens: object, text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        read_custom_camera({"name": "Hero", "to_world": POSE, "yfov": 40, "lens": lens})

@@ -330,6 +330,35 @@ def test_display_colors_without_a_material() -> None:
     np.testing.assert_allclose(shown, np.eye(3), atol=0.02)
 
 
+def test_cameras_have_their_depth_of_field_in_meters() -> None:
+    body = """
+def Camera "Sharp" {
+    float focusDistance = 3
+}
+def Camera "Blurred" {
+    float focalLength = 50
+    float fStop = 2.5
+    float focusDistance = 120
+}
+def Camera "Impossible" {
+    float fStop = 2.8
+    float focusDistance = -3
+}
+"""
+    scene = imported(usda(quad() + body, "metersPerUnit = 0.01"))
+    sharp, blurred, impossible = scene.cameras
+    assert sharp.lens is None
+    assert blurred.lens is not None
+    assert blurred.lens.radius == pytest.approx(0.01)  # 50 mm at f/2.5: 20 mm across
+    assert blurred.lens.focus_distance == pytest.approx(1.2)
+    assert impossible.lens is None
+    assert [warning for warning in scene.warnings if "“Impossible”" in warning and "focus_distance" in warning]
+    inches = imported(usda(quad() + body, "metersPerUnit = 0.01"), options=ImportOptions(unit="in"))
+    assert inches.cameras[1].lens is not None
+    assert inches.cameras[1].lens.focus_distance == pytest.approx(120 * 0.0254)
+    assert inches.cameras[1].lens.radius == pytest.approx(0.0254)
+
+
 def test_cameras_have_their_aperture_and_pose() -> None:
     body = """
 def Camera "Shot 1" {

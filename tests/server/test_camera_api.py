@@ -34,6 +34,8 @@ def test_camera_is_saved_listed_baked_and_deleted(real_client: TestClient, scene
     (front, *_) = real_client.get(url).json()
     assert (front["name"], front["is_placed"]) == ("front", False)
     frame = {"to_world": front["to_world"], "yfov": front["yfov"] / 2}
+    frame["lens"] = {"radius": 0.01, "focus_distance": 1.2, "blades": 6}
+    assert front["lens"] is None
     assert [real_client.put(f"{url}/Close up", json=frame).status_code for _ in range(2)] == [201, 204]
     saved = real_client.get(f"{url}/Close up").json()
     assert saved == {**frame, "near": 0.0, "name": "Close up", "is_placed": True}
@@ -82,6 +84,8 @@ def test_view_of_a_saved_camera_is_compared_with_its_reference(real_client: Test
         ({"yfov": 180}, 422),
         ({"yfov": "wide"}, 422),
         ({"aspect": 2}, 422),
+        ({"lens": {"radius": -1, "focus_distance": 1}}, 422),
+        ({"lens": {"radius": 0.1}}, 422),
     ],
 )
 def test_invalid_camera_is_rejected_and_not_saved(

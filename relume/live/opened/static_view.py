@@ -278,5 +278,8 @@ def _part(progress: ProgressCallback, start: float, stop: float) -> ProgressCall
 
 def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool, scene: Scene) -> str:
     """Return a unique name of a camera's static view, which identifies its images in the cache."""
-    identity = camera.to_world.tobytes() + repr((camera.yfov, camera.near, size, smooths_edges, scene.id)).encode()
+    identity = (
+        camera.to_world.tobytes()
+        + repr((camera.yfov, camera.near, camera.lens, size, smooths_edges, scene.id)).encode()
+    )
     return f"{camera.name} {hashlib.sha256(identity).hexdigest()[:16]}"

@@ -152,7 +152,7 @@ class _StageReader:
             meshes, self._objects = merge_by_material(meshes), {}
         collector = LightCollector(self._warnings)
         lights = UsdLightReader(self._time, meters, self._images, collector, self._warnings, self._objects)
-        cameras = self._lights_and_cameras(lights, origin)
+        cameras = self._lights_and_cameras(lights, origin, meters)
         emissions = [np.array(material.read_material.emission) for material in materials]
         scene_materials = collector.emissive_light(
             [material.read_material.material for material in materials], emissions, meshes
@@ -407,7 +407,7 @@ class _StageReader:
         uvs = np.column_stack([primvar.values[:, 0], 1 - primvar.values[:, 1]]).astype(np.float32)
         return material.read_material.uv_slot.apply({material.uv_name: uvs}, len(uvs)).astype(np.float64), primvar.index
 
-    def _lights_and_cameras(self, lights: UsdLightReader, origin: F64) -> list[Camera]:
+    def _lights_and_cameras(self, lights: UsdLightReader, origin: F64, meters: float) -> list[Camera]:
         from pxr import UsdGeom
 
         cameras, names = list[Camera](), dict[str, int]()
@@ -416,7 +416,7 @@ class _StageReader:
             moved[:3, 3] -= origin
             if not prim.IsA(UsdGeom.Camera):
                 lights.add(prim, moved)
-            elif (camera := read_camera(prim, moved, self._time, names, self._warnings)) is not None:
+            elif (camera := read_camera(prim, moved, self._time, meters, names, self._warnings)) is not None:
                 cameras.append(camera)
         return cameras
 

@@ -10,7 +10,7 @@ from relume.core.errors import NotFoundError
 from relume.scene.scene_folder import load_cameras
 from relume_server.api.pagination import PageDep
 from relume_server.schemas.base import MAX_NAME, Id
-from relume_server.schemas.cameras import CameraEntry, CameraFrame
+from relume_server.schemas.cameras import CameraEntry, FixedCameraFrame
 from relume_server.services import Services, ServicesDep
 from relume_worker.cameras import delete_camera, list_cameras, store_camera
 from relume_worker.paths import scene_path
@@ -37,7 +37,7 @@ def get_camera(scene: Id, name: CameraName, services: ServicesDep) -> CameraEntr
 
 
 @router.put("/{name}", status_code=204, responses={201: {"description": "Created"}, 204: {"description": "Replaced"}})
-def put_camera(scene: Id, name: CameraName, frame: CameraFrame, services: ServicesDep) -> Response:
+def put_camera(scene: Id, name: CameraName, frame: FixedCameraFrame, services: ServicesDep) -> Response:
     """Store a camera under a name: 201 if it is new. Bakes of its previous version are unchanged."""
     is_new = store_camera(services.bakes.ledger, scene, frame.custom_camera(name))
     return Response(status_code=201 if is_new else 204)
@@ -53,7 +53,7 @@ def delete_placed_camera(scene: Id, name: CameraName, services: ServicesDep) -> 
 def _entries(scene: str, services: Services) -> list[CameraEntry]:
     record = get_scene(services.bakes.ledger, scene)
     scene_cameras = [
-        CameraEntry(**CameraFrame.from_camera(c).model_dump(), name=c.name, is_placed=False)
+        CameraEntry(**FixedCameraFrame.from_camera(c).model_dump(), name=c.name, is_placed=False)
         for c in load_cameras(fetch_if_missing(scene_path(services.settings.data, record.id)))
     ]
     placed_cameras = list_cameras(services.bakes.ledger, record.id)

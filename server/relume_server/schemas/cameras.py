@@ -8,6 +8,7 @@ from typing import Annotated, Self
 from pydantic import Field
 
 from relume.scene.custom_camera import CustomCamera, make_custom_camera
+from relume.scene.lens import Lens, make_lens
 from relume.scene.model import Camera
 from relume_server.schemas.base import Body, Name
 
@@ -39,7 +40,36 @@ class CameraFrame(Body):
         return make_custom_camera(name, self.to_world, self.yfov, self.near)
 
 
-class CameraBody(CameraFrame):
+class LensBody(Body):
+    """Depth of field: `radius` of the aperture and depth that is sharp, meters; `blades` of a polygon, 0: round."""
+
+    radius: float
+    focus_distance: float
+    blades: int = 0
+
+    def lens(self) -> Lens:
+        """Validate it. Raises ParameterError."""
+        return make_lens(self.radius, self.focus_distance, self.blades)
+
+
+class FixedCameraFrame(CameraFrame):
+    """Camera of a bake; without a `lens` everything is sharp. A free camera has none."""
+
+    lens: LensBody | None = None
+
+    @classmethod
+    def from_camera(cls, camera: Camera) -> Self:
+        """Describe a camera."""
+        lens = camera.lens and LensBody(**camera.lens.document())
+        return super().from_camera(camera).model_copy(update={"lens": lens})
+
+    def custom_camera(self, name: str) -> CustomCamera:
+        """Validate it. Raises ParameterError."""
+        lens = None if self.lens is None else self.lens.lens()
+        return make_custom_camera(name, self.to_world, self.yfov, self.near, lens)
+
+
+class CameraBody(FixedCameraFrame):
     """A camera that a user placed, by name."""
 
     name: Name

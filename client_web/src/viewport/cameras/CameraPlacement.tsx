@@ -1,6 +1,6 @@
 /** The camera placement viewport: navigate the scene in plain colors, then save the camera. */
 import { useEffect, useId, useRef, useState } from "preact/hooks";
-import type { SceneBody, Triple } from "../../protocol";
+import type { LensBody, SceneBody, Triple } from "../../protocol";
 import { LatestRequest } from "../../session/net/latestRequest";
 import type { BakeSize } from "../../session/scene/recipe";
 import { IconButton } from "../../ui/IconButton";
@@ -15,7 +15,8 @@ import {
 } from "./cameraRequests";
 import { saveCameraAs } from "./savedCameras";
 import { CameraMotion } from "./cameraMotion";
-import { poseOf, orbitOf, type Bounds, type CameraPose, type Orbit } from "./orbit";
+import { depthOf, poseOf, orbitOf, type Bounds, type CameraPose, type Orbit } from "./orbit";
+import { DepthOfField } from "./DepthOfField";
 import { LensSliders, StopAtWalls } from "./LensFields";
 import { CAMERA_STEPS, NAVIGATION_HELP, NAVIGATION_LABELS } from "./cameraSteps";
 import { navigation, stopsAtWalls, toggleNavigation, wallMargin } from "./navigation";
@@ -44,6 +45,8 @@ interface PlacementStart {
   overview: Orbit;
   /** An orbit in the scene's largest room; null if nothing is enclosed. */
   interior: Orbit | null;
+  /** Depth of field of the first camera. */
+  firstLens: LensBody | null;
 }
 
 /** The scene's bounds, and the initial orbit around the point in the image's center: by default of its first camera, or
@@ -54,13 +57,14 @@ async function startPlacement(scene: string, from: CameraPose | null): Promise<P
     listCameras(scene),
   ]);
   const bounds: Bounds = { lowest: bounds_min as Triple, highest: bounds_max as Triple };
-  const frame = from ?? (opens_inside ? interior_camera : null) ?? cameras[0] ?? default_camera;
+  const frame: CameraPose = from ?? (opens_inside ? interior_camera : null) ?? cameras[0] ?? default_camera;
   const target = await pickTarget(scene, frame, IDLE_SIZE, IDLE_SIZE[0] / 2, IDLE_SIZE[1] / 2);
   return {
     bounds,
     first: orbitOf(frame, bounds, target),
     overview: orbitOf(default_camera, bounds),
     interior: interior_camera && orbitOf(interior_camera, bounds),
+    firstLens: frame.lens ?? null,
   };
 }
 
@@ -164,13 +168,15 @@ interface PlacementProps extends PlacementStart {
   onSave: (name: string) => void;
 }
 
-function PlacementView({ scene, bounds, first, overview, interior, name, onSave }: PlacementProps) {
+function PlacementView({ scene, bounds, first, overview, interior, firstLens, name, onSave }: PlacementProps) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const [imageError, setImageError] = useState(""); // a later image does not resolve a rejected save
   const [saveError, setSaveError] = useState("");
   const [cameraName, setCameraName] = useState(name ?? nextCameraName(scene.views.map((view) => view.name)));
   const { orbit, wall, jump, camera } = usePlacementCamera(scene.id, canvas, first, bounds, setImageError);
   const { change } = camera;
+  const [lens, setLens] = useState(firstLens);
+  const [focuses, setFocuses] = useState(false);
   const mode = navigation.value;
   const field = useId();
 
@@ -180,7 +186,9 @@ function PlacementView({ scene, bounds, first, overview, interior, name, onSave 
     setSaveError("");
     try {
       const target = await pickTarget(scene.id, poseOf(orbit), IDLE_SIZE, u * IDLE_SIZE[0], v * IDLE_SIZE[1]);
-      if (target !== null) change((now) => ({ ...now, target }));
+      if (target === null) return;
+      if (focuses && lens !== null) setLens({ ...lens, focus_distance: depthOf(orbit, target) });
+      else change((now) => ({ ...now, target }));
     } catch (error) {
       setSaveError((error as Error).message);
     }
@@ -189,7 +197,7 @@ function PlacementView({ scene, bounds, first, overview, interior, name, onSave 
     event.preventDefault();
     setSaveError("");
     try {
-      await saveCameraAs(scene.id, cameraName.trim(), poseOf(orbit), name);
+      await saveCameraAs(scene.id, cameraName.trim(), { ...poseOf(orbit), lens }, name);
       onSave(cameraName.trim());
     } catch (error) {
       setSaveError((error as Error).message);
@@ -257,6 +265,7 @@ function PlacementView({ scene, bounds, first, overview, interior, name, onSave 
         <StopAtWalls title="The camera stops at surfaces" />
       </div>
       <LensSliders orbit={orbit} bounds={bounds} change={change} />
+      <DepthOfField lens={lens} distance={orbit.distance} focuses={focuses} onChange={setLens} onFocuses={setFocuses} />
       <div class="placement-keep">
         <label for={field}>Name</label>
         <input

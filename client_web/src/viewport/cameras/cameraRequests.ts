@@ -13,8 +13,8 @@ export const listCameras = (scene: string) => getJson<CameraEntry[]>(`${cameraUr
 export const getPlacementView = (scene: string) => getJson<ViewportBody>(`${cameraUrl(scene)}/viewport`);
 
 export async function saveCamera(scene: string, name: string, camera: CameraPose): Promise<void> {
-  const { to_world, yfov, near = 0 } = camera;
-  await request(namedCameraUrl(scene, name), json("PUT", { to_world, yfov, near }));
+  const { to_world, yfov, near = 0, lens = null } = camera;
+  await request(namedCameraUrl(scene, name), json("PUT", { to_world, yfov, near, lens }));
 }
 
 export async function deleteCamera(scene: string, name: string): Promise<void> {

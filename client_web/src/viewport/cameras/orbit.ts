@@ -1,5 +1,5 @@
 /** A camera that orbits a target, turns where it stands, or walks. Angles in radians, lengths in meters, +Y up. */
-import type { Triple } from "../../protocol";
+import type { LensBody, Triple } from "../../protocol";
 import { add, cross, dot, length, scale, subtract, normalize } from "../../panels/lights/vector";
 
 export interface Orbit {
@@ -22,6 +22,8 @@ export interface CameraPose {
   to_world: number[];
   yfov: number;
   near?: number;
+  /** Depth of field of a camera to bake. */
+  lens?: LensBody | null;
 }
 
 export interface Bounds {
@@ -29,6 +31,7 @@ export interface Bounds {
   highest: Triple;
 }
 
+export const MIN_FOCUS_DISTANCE = 1e-3; // meters
 export const MIN_YFOV = 1;
 export const MAX_YFOV = 170;
 const HIGHEST = (89.9 * Math.PI) / 180; // straight down, the up direction is undefined
@@ -92,6 +95,10 @@ export function rotateOrbit(orbit: Orbit, azimuth: number, elevation: number): O
 
 /** The view direction. */
 export const forwardOf = (orbit: Orbit): Triple => scale(cameraAxes(orbit).backward, -1);
+
+/** Depth of a point along the view direction, meters. */
+export const depthOf = (orbit: Orbit, point: Triple): number =>
+  Math.max(MIN_FOCUS_DISTANCE, dot(subtract(point, positionOf(orbit)), forwardOf(orbit)));
 
 /** Turn the head: the camera stays where it is. */
 export function turnHead(orbit: Orbit, azimuth: number, elevation: number): Orbit {
