@@ -25,6 +25,7 @@ def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str
         "created": iso_time(record.created),
         "views": [{"name": view, "is_placed": False} for view in record.views],
         "materials": list(record.materials),
+        "objects": list(record.objects),
         "lights": list(record.lights),
         "variants": [{"name": name, "look": look} for name, look in record.variants.items()],
         "warnings": [warning.document() for warning in record.warnings],
