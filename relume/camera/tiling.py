@@ -63,8 +63,13 @@ def morton(pixel: Shaped[NDArray[np.int64], " n"], width: int) -> Shaped[NDArray
     return code
 
 
-def image_tiles(size: tuple[int, int], tile_size: int = TILE_SIZE) -> list[ImageTile]:
-    """Tiles of an image, in Morton order. size: width and height in pixels. tile_size: a power of two, pixels"""
+def image_tiles(size: tuple[int, int], tile_size: int | None = None) -> list[ImageTile]:
+    """Tiles of an image, in Morton order.
+
+    Args:
+        size: width and height in pixels. tile_size: a power of two, pixels; None: `TILE_SIZE`.
+    """
+    tile_size = tile_size or TILE_SIZE
     columns, rows = (-(-length // tile_size) for length in size)
     order = np.argsort(morton(np.arange(columns * rows), columns), kind="stable")
     return [

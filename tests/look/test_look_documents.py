@@ -29,7 +29,7 @@ def test_default_look_has_every_field(default):
     panel = {"kind": "mesh", "material": "Teapot", "image": None, "emission": [5.0, 5.0, 4.0]}
     assert default["lights"] == {"Key": {**plain, **spot, "emission": [1.0, 1.0, 1.0]}, "Panel": {**plain, **panel}}
     assert default["transport"] == {"show": "all", "bounces": 24}
-    assert default["display"] == {"exposure": 0.0, "tone_map": "agx"}
+    assert default["display"] == {"exposure": 0.0, "tone_map": "agx", "temperature": 6500.0, "tint": 0.0, "lut": None}
     assert json.loads(json.dumps(default)) == default
     assert complete(default, default) == default
 
@@ -44,7 +44,7 @@ def test_partial_look_keeps_what_it_does_not_name(default):
     assert [t["model"] for t in full["materials"]["Teapot"]["terms"]] == ["lambert"]
     assert full["materials"]["a/b~c"] == default["materials"]["a/b~c"]
     assert full["lights"] == {**default["lights"], "Key": {**default["lights"]["Key"], "enabled": False}}
-    assert full["display"] == {"exposure": 2, "tone_map": "agx"}
+    assert full["display"] == {**default["display"], "exposure": 2}
     assert complete({}, default) == default
 
 

@@ -37,7 +37,8 @@ def test_defaults_are_optional_in_inputs_only() -> None:
 
 def test_look_type_is_complete() -> None:
     text = typescript.generate_look()
-    assert "  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;" in text
+    kinds = ("Point", "Spot", "Directional", "Rectangle", "Disc", "Sphere", "Tube", "Mesh", "Points", "Panels")
+    assert f"  lights: Record<string, {' | '.join(f'{kind}Look' for kind in kinds)}>;" in text
     assert "  texture: string | null;" in text
     assert "  shadow_catcher?: boolean;" in text
 
