@@ -32,8 +32,8 @@ IMAGE_WIDTH = 160
 
 @router.post("", name="solve_look")
 async def solve(request: SolveRequest, services: ServicesDep) -> SolveBody:
-    """Return the look whose lights, and materials by request, come nearest to a target. The first call for a view renders
-    an image of each light; without strokes and reference it does nothing else.
+    """Return the look whose lights, and materials by request, come nearest to a target. The first call for a view
+    renders an image of each light; without strokes and reference it does nothing else.
     """
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
