@@ -12,7 +12,20 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from relume_cli import audit, bake, bench, demo, environment_import, export, import_scene, render, serve, tokens, worker
+from relume_cli import (
+    audit,
+    bake,
+    bench,
+    demo,
+    environment_import,
+    export,
+    import_scene,
+    render,
+    serve,
+    solve,
+    tokens,
+    worker,
+)
 from relume_cli.backup import backup, restore
 from relume_cli.database import cancel, delete, listing, revision_draft, status, upgrade
 from relume_cli.error_message import error_message
@@ -44,6 +57,7 @@ app.command("bake")(bake.bake)
 app.command("status")(status.status)
 app.command("cancel")(cancel.cancel)
 app.command("render")(render.render)
+app.command("solve")(solve.solve)
 app.command("export")(export.export)
 app.command("delete")(delete.delete)
 app.command("serve", short_help="Serve the editor and the API.")(serve.serve)

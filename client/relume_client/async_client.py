@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import contextlib
 import os
 import sys
@@ -28,6 +29,8 @@ from relume_client.bodies import (
     RenderBody,
     RenderOptions,
     SceneBody,
+    SolveBody,
+    SolveOptions,
 )
 from relume_client.errors import JobFailedError
 from relume_client.images import decode_displayed
@@ -271,6 +274,32 @@ class AsyncBake(AsyncJob[BakeBody]):
         request = to_json({"bake": self.id, "view": name, "views": [name], "look": look})
         body = await self._transport.json("POST", "/api/shares", body=request)
         return f"{self._transport.url}{body['url']}"
+
+    async def solve(
+        self,
+        look: AnyLook = {},  # noqa: B006 - never changed
+        *,
+        reference: str | os.PathLike[str] | None = None,
+        fit_exposure: bool = False,
+        view: str | None = None,
+        **options: Unpack[SolveOptions],
+    ) -> SolveBody:
+        """Find the lights of a look, and materials by request, from a picture or from strokes.
+
+        Args:
+            look: the current look, may be partial. reference: a picture: PNG, JPEG, WebP, HDR or EXR.
+            fit_exposure: only its relative brightness counts. view: name of a view; by default the first.
+            options: fields of the request, as in docs/inverse-lighting.md: `strokes`, `locked`, `materials`, `change`,
+                `rotate`, `camera`, `size`.
+        Returns:
+            `look`, the given one with the changes; `residual`; what cannot be reached in `shortfalls`.
+        """
+        name = self.info["recipe"]["views"][0] if view is None else view
+        request = {"bake": self.id, "view": name, "look": look, **options}
+        if reference is not None:
+            image = base64.b64encode(Path(reference).read_bytes()).decode()
+            request["reference"] = {"image": image, "fit_exposure": fit_exposure}
+        return cast(SolveBody, await self._transport.json("POST", "/api/solve", body=to_json(request)))
 
     async def submit(
         self, looks: Looks, image_format: str, *, view: str | None = None, **options: Unpack[RenderOptions]

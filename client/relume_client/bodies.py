@@ -482,6 +482,14 @@ class ParameterBody(TypedDict):
     requires_new_operator: bool
 
 
+class PatchOperation(TypedDict):
+    """One operation of a JSON Patch (RFC 6902) on the look."""
+
+    op: Literal["replace", "add", "remove", "test"]
+    path: str
+    value: NotRequired[Any]
+
+
 class PathAnswer(TypedDict):
     """server → client: `length` of a path to its first surface, meters, with its material and unit normal; null if the
     path is free."""
@@ -763,6 +771,52 @@ class SharedOperation(TypedDict):
     value: Any
 
 
+class ShortfallBody(TypedDict):
+    """A part of the target that cannot be reached. `stroke`: its index, null for a whole reference picture. `cause`:
+    all lights that reach it are `locked`; `no_light` reaches it; or lights that do, reach other pixels, too
+    (`conflict`). `asked_stops`, `reached_stops`: change of its mean luminance, null from or to black."""
+
+    stroke: int | None
+    residual: float
+    cause: Literal["locked", "no_light", "conflict"]
+    asked_stops: float | None
+    reached_stops: float | None
+
+
+class SolveBody(TypedDict):
+    """The solution. `patch`: JSON Patch on the complete look; `look`: the look of the request with these changes.
+    `changes`: changed lights; `materials`: names of changed materials, whose terms the patch replaces. `residual`,
+    `residual_before`: relative RMS error of the marked pixels; 0 if none are marked."""
+
+    patch: Sequence[PatchOperation]
+    look: Mapping[str, Any]
+    residual: float
+    residual_before: float
+    changes: Sequence[SourceChange]
+    materials: Sequence[str]
+    shortfalls: Sequence[ShortfallBody]
+
+
+class SolveOptions(TypedDict):
+    """Optional fields of a request."""
+
+    camera: NotRequired[CameraFrame | None]
+    size: NotRequired[Sequence[int] | None]
+    strokes: NotRequired[Sequence[StrokeBody]]
+    locked: NotRequired[Sequence[str]]
+    change: NotRequired[Literal["intensity", "color"] | None]
+    rotate: NotRequired[bool]
+    materials: NotRequired[Sequence[str]]
+
+
+class SourceChange(TypedDict):
+    """Change of a light. `pointer`: JSON pointer of the light in the look. `stops`: of its luminance; null from or to
+    black."""
+
+    pointer: str
+    stops: float | None
+
+
 class SphereLook(TypedDict):
     """A sphere; emission is radiance. The camera does not see it. `radius`: meters."""
 
@@ -801,6 +855,18 @@ class StatusMessage(TypedDict):
     view: str
     label: str
     progress: float
+
+
+class StrokeBody(TypedDict):
+    """A stroke of a brush over the image: `brighter` or `darker` by `stops`; in a `color` (linear Rec. 709) at equal
+    luminance; or as the `reference` picture there."""
+
+    kind: Literal["brighter", "darker", "color", "reference"]
+    points: NotRequired[Sequence[Sequence[float]]]
+    radius: NotRequired[float]
+    mask: NotRequired[str | None]
+    stops: NotRequired[float]
+    color: NotRequired[Sequence[float]]
 
 
 class SurfaceNames(TypedDict):

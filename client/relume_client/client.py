@@ -40,6 +40,8 @@ from relume_client.bodies import (
     RenderBody,
     RenderOptions,
     SceneBody,
+    SolveBody,
+    SolveOptions,
     ViewInfo,
 )
 from relume_client.looks import Look
@@ -275,6 +277,21 @@ class Bake(_Job[BakeBody]):
     ) -> list[Path]:
         """Render exact images of looks into files. See `AsyncBake.render`."""
         call = self._bake.render(looks, out, view=view, progress=progress, timeout=timeout, **options)
+        return self._thread.run(call)
+
+    def solve(
+        self,
+        look: AnyLook | None = None,
+        *,
+        reference: str | os.PathLike[str] | None = None,
+        fit_exposure: bool = False,
+        view: str | None = None,
+        **options: Unpack[SolveOptions],
+    ) -> SolveBody:
+        """Find lights and materials from a picture or from strokes. See `AsyncBake.solve`."""
+        call = self._bake.solve(
+            {} if look is None else look, reference=reference, fit_exposure=fit_exposure, view=view, **options
+        )
         return self._thread.run(call)
 
     def submit(

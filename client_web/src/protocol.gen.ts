@@ -296,7 +296,7 @@ export interface SharedPaths {
   bounces: number;
 }
 
-/** Find the lights of a look from its image. `look`: a look document, may be partial. `camera` and `size`: of a bake with a free camera, by default the view's. Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all strokes are `brighter` or `darker`. `rotate`: the environment may rotate, which renders it about 25 times. */
+/** Find the lights of a look from its image. `look`: a look document, may be partial. `camera` and `size`: of a bake with a free camera, by default the view's. Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all strokes are `brighter` or `darker`. `rotate`: the environment may rotate, which renders it about 25 times. `materials`: names of materials whose colors and parameters may change; at most 12 steps, each of which renders an image of each light and one of each number. */
 export interface SolveRequest {
   bake: string;
   view: string;
@@ -308,6 +308,7 @@ export interface SolveRequest {
   locked?: string[];
   change?: "intensity" | "color" | null;
   rotate?: boolean;
+  materials?: string[];
 }
 
 /** A stroke of a brush over the image: `brighter` or `darker` by `stops`; in a `color` (linear Rec. 709) at equal luminance; or as the `reference` picture there. `points`: a line in pixels, from the left and from the top of the image, with a brush of `radius` pixels. `mask`: instead, a gray PNG of the image in base64, white where the stroke is. */
@@ -1118,13 +1119,14 @@ export interface ShortfallBody {
   reached_stops: number | null;
 }
 
-/** The solution. `patch`: JSON Patch on the complete look; `look`: the look of the request with these changes. `residual`, `residual_before`: relative RMS error of the marked pixels; 0 if none are marked. */
+/** The solution. `patch`: JSON Patch on the complete look; `look`: the look of the request with these changes. `changes`: changed lights; `materials`: names of changed materials, whose terms the patch replaces. `residual`, `residual_before`: relative RMS error of the marked pixels; 0 if none are marked. */
 export interface SolveBody {
   patch: PatchOperation[];
   look: Record<string, unknown>;
   residual: number;
   residual_before: number;
   changes: SourceChange[];
+  materials: string[];
   shortfalls: ShortfallBody[];
 }
 

@@ -2,6 +2,7 @@ import { beforeEach, describe, expect, test, vi } from "vitest";
 import { history } from "../src/edit/history";
 import {
   beginStroke,
+  changesMaterials,
   cancelMatch,
   endStroke,
   extendStroke,
@@ -12,6 +13,7 @@ import {
 } from "../src/panels/lights/match/match";
 import { isMatchOpen, lockedPointers, toggleLock } from "../src/state/match";
 import type { SolveBody, SolveRequest } from "../src/protocol";
+import { stage } from "../src/render/renderStage";
 import { bake } from "../src/state/bakes";
 import { look } from "../src/state/look";
 import { LOOK } from "./exampleLook";
@@ -28,6 +30,7 @@ const answer = (intensity: number): SolveBody => ({
   residual: 0.034,
   residual_before: 0.5,
   changes: [{ pointer: "/environment", stops: 1 }],
+  materials: [],
   shortfalls: [],
 });
 
@@ -61,6 +64,22 @@ describe("a stroke", () => {
     expect(look.value?.environment.intensity).toBe(3);
     expect(history.steps.value.map(({ label }) => label)).toEqual(["Match · Brighter"]);
     expect(requests.at(-1)?.strokes?.[0]).toMatchObject({ kind: "brighter", radius: 4, stops: 1 });
+    expect(gesture.value).toBeNull();
+  });
+
+  test("changes the materials painted on when it ends, if asked", async () => {
+    changesMaterials.value = true;
+    vi.spyOn(stage.imageOf("front"), "material").mockImplementation((x) => (x < 15 ? "Paper" : null));
+    beginStroke("front", [10, 10], 4);
+    await settle();
+    expect(requests.at(-1)?.materials).toEqual([]);
+    extendStroke([20, 10]);
+    endStroke();
+    await settle();
+    await settle();
+    changesMaterials.value = false;
+    expect(requests.at(-1)?.materials).toEqual(["Paper"]);
+    expect(history.steps.value).toHaveLength(1);
     expect(gesture.value).toBeNull();
   });
 

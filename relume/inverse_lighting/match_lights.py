@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
@@ -27,13 +28,14 @@ class Match:
 
     Attributes:
         changes: changed fields by the JSON pointers of their sources. stops: change of their luminance; None from or to
-            black. residual: relative RMS error of the marked
+            black. image: its radiance. residual: relative RMS error of the marked
             pixels; `residual_before`: that of the current look. error: the same of all pixels
             with weight, also those that are to stay. shortfalls: regions that are not reached.
     """
 
     changes: dict[str, dict[str, Any]]
     stops: dict[str, float | None]
+    image: Shaped[NDArray[np.float32], "height width 3"]
     residual: float
     residual_before: float
     error: float
@@ -47,12 +49,14 @@ def match_lights(
     *,
     changes_color: bool = True,
     ridge: float = RIDGE,
+    before: Shaped[NDArray[np.float32], "height width 3"] | None = None,
 ) -> Match:
     """Find the intensities and colors of lights with which the image is nearest to a target.
 
     Args:
         sources: the sources. painted: the target. locked: JSON pointers of sources that stay.
         changes_color: colors change, too. ridge: see `relume.inverse_lighting.solve`.
+        before: current image, if the sources are those of a look with other changes.
     Raises:
         ParameterError: a pointer in `locked` is no source. ShapeMismatchError: the target has another size.
     """
@@ -62,14 +66,16 @@ def match_lights(
     equations = NormalEquations.from_target(sources, painted.target)
     strengths = solve_strengths(sources, equations, is_free, changes_color=changes_color, ridge=ridge)
     image, radiance, marked = sources.image(strengths), painted.target.radiance, painted.marked
+    before = sources.image(sources.strengths) if before is None else before
     changes = strength_changes(sources, strengths, changes_color=changes_color)
     return Match(
         changes,
         {pointer: _stops(sources, strengths, pointer) for pointer in changes},
+        image,
         residual(image, radiance, marked),
-        residual(sources.image(sources.strengths), radiance, marked),
+        residual(before, radiance, marked),
         residual(image, radiance, painted.target.weights),
-        tuple(shortfalls(sources, strengths, is_free, radiance, painted.regions)),
+        tuple(shortfalls(sources, (before, image), is_free, radiance, painted.regions)),
     )
 
 

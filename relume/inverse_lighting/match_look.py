@@ -9,11 +9,19 @@ from typing import Any
 import numpy as np
 
 from relume.inverse_lighting.match_lights import Match, match_lights
+from relume.inverse_lighting.match_materials import match_materials
 from relume.inverse_lighting.painting import PaintedTarget, Stroke, painted_target
 from relume.inverse_lighting.reference_picture import match_exposure, read_reference
 from relume.inverse_lighting.rotation import best_rotation
 from relume.inverse_lighting.solve import RIDGE
-from relume.inverse_lighting.sources import ENVIRONMENT_POINTER, RenderLook, load_sources, replace_operations
+from relume.inverse_lighting.sources import (
+    ENVIRONMENT_POINTER,
+    RenderLook,
+    Sources,
+    load_sources,
+    pointer_of,
+    replace_operations,
+)
 from relume.look import Look
 
 REFERENCE_RIDGE = 1e-6
@@ -30,7 +38,7 @@ class MatchRequest:
         strokes: makes the strokes for an image of a width and a height. reference: contents of a picture's file.
         fits_exposure: the reference picture is scaled to the image's mean luminance.
         locked: JSON pointers of lights that stay. changes_color: colors of lights may change.
-        rotates: the environment may rotate, unless it is locked.
+        rotates: the environment may rotate, unless it is locked. materials: names of those that may change.
     """
 
     strokes: MakeStrokes = lambda size: ()
@@ -39,18 +47,25 @@ class MatchRequest:
     locked: frozenset[str] = frozenset()
     changes_color: bool = True
     rotates: bool = False
+    materials: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
 class LookMatch:
-    """A matched look: the operations of a JSON Patch on a complete look, and the report."""
+    """A matched look.
+
+    Attributes:
+        operations: those of a JSON Patch on a complete look; they replace all terms of a material that changes.
+        materials: names of the changed materials. match: the report.
+    """
 
     operations: list[dict[str, Any]]
+    materials: tuple[str, ...]
     match: Match
 
 
 def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMatch:
-    """Find the lights of a look with which its image is nearest to a target.
+    """Find the lights, and the materials by request, with which the image of a look is nearest to a target.
 
     Args:
         look: the current look. render: renders small images of looks; all have the same size. request: the target.
@@ -59,26 +74,34 @@ def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMat
         ParameterError: the request does not fit the look.
     """
     sources = load_sources(look, render)
-    painted = _painted(look, sources.image(sources.strengths), request)
+    before = sources.image(sources.strengths)
+    painted = _painted(look, before, request)
     ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
 
-    def match_at(rotation: float) -> Match:
+    def match(sources: Sources) -> Match:
         return match_lights(
-            load_sources(_rotated(look, rotation), render),
-            painted,
-            request.locked,
-            changes_color=request.changes_color,
-            ridge=ridge,
+            sources, painted, request.locked, changes_color=request.changes_color, ridge=ridge, before=before
         )
 
-    current = look.environment.rotation
-    if not request.rotates or ENVIRONMENT_POINTER in request.locked or not painted.marked.any():
-        match = match_at(current)
-        return LookMatch(replace_operations(match.changes), match)
-    rotation = best_rotation(lambda degrees: match_at(degrees).error, current)
-    match = match_at(rotation)
-    rotated = [] if rotation == current % 360 else [{ENVIRONMENT_POINTER: {"rotation": rotation}}]
-    return LookMatch([op for changes in (*rotated, match.changes) for op in replace_operations(changes)], match)
+    def error(rotation: float) -> float:
+        return match(load_sources(_rotated(look, rotation), render)).error
+
+    after = look
+    if request.rotates and ENVIRONMENT_POINTER not in request.locked and painted.marked.any():
+        after = _rotated(look, best_rotation(error, look.environment.rotation))
+    if request.materials and painted.marked.any():
+        after = match_materials(after, request.materials, render, painted.target, match, ridge)
+    return _look_match(look, after, match(load_sources(after, render)))
+
+
+def _look_match(look: Look, after: Look, match: Match) -> LookMatch:
+    """Return the changes from a look to another one, besides those of its lights."""
+    rotation = after.environment.rotation
+    rotated = {} if rotation == look.environment.rotation % 360 else {ENVIRONMENT_POINTER: {"rotation": rotation}}
+    names = tuple(name for name, material in after.materials.items() if material.terms != look.materials[name].terms)
+    terms = {pointer_of("materials", name): after.materials[name].model_dump(include={"terms"}) for name in names}
+    operations = [op for changes in (rotated, terms, match.changes) for op in replace_operations(changes)]
+    return LookMatch(operations, names, match)
 
 
 def _rotated(look: Look, rotation: float) -> Look:

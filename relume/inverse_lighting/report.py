@@ -63,7 +63,7 @@ def residual(
 
 def shortfalls(
     sources: Sources,
-    strengths: Shaped[F64, "sources 3"],
+    images: tuple[Shaped[F32, "height width 3"], Shaped[F32, "height width 3"]],
     is_free: Shaped[NDArray[np.bool_], " sources"],
     radiance: Shaped[F32, "height width 3"],
     regions: Sequence[Region],
@@ -71,10 +71,10 @@ def shortfalls(
     """Return the regions of a target that are not reached.
 
     Args:
-        sources: the sources. strengths: of the solution. is_free: as in `solve_strengths`.
+        sources: the sources. images: the current one, and that of the solution. is_free: as in `solve_strengths`.
         radiance: of the target. regions: of the target.
     """
-    before, after = sources.image(sources.strengths), sources.image(strengths)
+    before, after = images
     unreached = []
     for k, region in enumerate(regions):
         if not _is_reached(after, radiance, region):

@@ -54,7 +54,12 @@ class NormalEquations:
             ShapeMismatchError: the target has another size than the images. ParameterError: a weight is negative or
                 not finite.
         """
-        radiance, weights = _checked(sources, target)
+        if target.radiance.shape != sources.constant.shape or target.weights.shape != sources.constant.shape[:2]:
+            raise ShapeMismatchError(
+                f"the target has the shape {target.radiance.shape}, its weights {target.weights.shape}, and the image "
+                f"{sources.constant.shape}; resize it"
+            )
+        radiance, weights = valid_target(target)
         images = sources.images.reshape(*sources.images.shape[:2], -1)
         weighted, wanted = images * weights.reshape(-1), (radiance - sources.constant).reshape(-1, 3)
         return cls(
@@ -64,12 +69,12 @@ class NormalEquations:
         )
 
 
-def _checked(sources: Sources, target: Target) -> tuple[F32, F32]:
-    if target.radiance.shape != sources.constant.shape or target.weights.shape != sources.constant.shape[:2]:
-        raise ShapeMismatchError(
-            f"the target has the shape {target.radiance.shape}, its weights {target.weights.shape}, and the image "
-            f"{sources.constant.shape}; resize it"
-        )
+def valid_target(target: Target) -> tuple[Shaped[F32, "height width 3"], Shaped[F32, "height width"]]:
+    """Return radiance and weights of a target, both finite and at least 0.
+
+    Raises:
+        ParameterError: a weight is negative or not finite.
+    """
     if not (np.isfinite(target.weights).all() and (target.weights >= 0.0).all()):
         raise ParameterError("weights", "weights below 0 or not finite", "numbers of at least 0")
     is_valid = np.asarray(np.isfinite(target.radiance).all(axis=-1))

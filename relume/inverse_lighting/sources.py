@@ -70,12 +70,12 @@ class Sources:
 def source_lights(look: Look) -> dict[str, LightLook | EnvironmentLook]:
     """Return the enabled lights of a look and its environment by their JSON pointers."""
     lights: dict[str, LightLook | EnvironmentLook] = {ENVIRONMENT_POINTER: look.environment}
-    return lights | {light_pointer(name): light for name, light in look.lights.items() if light.enabled}
+    return lights | {pointer_of("lights", name): light for name, light in look.lights.items() if light.enabled}
 
 
-def light_pointer(name: str) -> str:
-    """Return the JSON pointer of a light in a look."""
-    return str(JsonPointer.from_parts(["lights", name]).path)
+def pointer_of(section: str, name: str) -> str:
+    """Return the JSON pointer of a light or a material in a look."""
+    return str(JsonPointer.from_parts([section, name]).path)
 
 
 def load_sources(look: Look, render: RenderLook) -> Sources:

@@ -32,11 +32,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal, NotRequired, TypedDict
 '''
-BODIES = "SceneBody", "BakeBody", "RenderBody", "LooksBody", "ModelBody", "Look", "LookEntry", "CameraFrame"
+BODIES = (
+    "SceneBody",
+    "BakeBody",
+    "RenderBody",
+    "LooksBody",
+    "ModelBody",
+    "Look",
+    "LookEntry",
+    "CameraFrame",
+    "SolveBody",
+)
 OPTIONS: Mapping[str, tuple[str, frozenset[str]]] = {
     "ImportOptions": ("Body_import_scene", frozenset({"scene", "companions", "environment"})),
     "BakeOptions": ("BakeRequest", frozenset({"scene", "method", "dry_run"})),
     "RenderOptions": ("RenderRequest", frozenset({"bake", "looks", "view", "format", "dry_run"})),
+    "SolveOptions": ("SolveRequest", frozenset({"bake", "look", "view", "reference"})),
 }
 """Optional arguments of calls: the fields of a request, without those that the client fills in."""
 RENAMED = {"Look": "LookDocument"}  # the client has a class of this name

@@ -72,7 +72,7 @@ def test_a_light_mix_sets_lights_by_name_and_leaves_materials_alone(bake: Bake) 
     assert mixed["lights"]["Key"] == {**document["lights"]["Key"], **MIX["lights"]["Key"]}
     assert mixed["lights"]["Sun"] == {**document["lights"]["Sun"], "intensity": 0.5}
     assert list(mixed["lights"]) == ["Key", "Sun"]
-    assert mixed["environment"] == MIX["environment"]
+    assert mixed["environment"] == {**document["environment"], **MIX["environment"]}
     with pytest.raises(ProblemError, match="version"):
         bake.with_light_mix(look, {**MIX, "version": 2})
     with pytest.raises(ProblemError, match="/mix/format"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from export_scenes import export_of, sample_scene
@@ -15,6 +15,7 @@ from relume.export.export_scene import FORMATS, export_report, format_of
 from relume.export.write_light_mix import write_light_mix
 from relume.look import complete, default_look, validate
 from relume.look.light_mix import UNITS, expand_light_mix
+from relume.look.model import LightKind
 from relume.scene.model import Light
 
 PANEL = Light("Panel", {"kind": "rectangle", "position": [0.0, 1.0, 2.0], "emission": [2.0, 2.0, 2.0]})
@@ -37,12 +38,13 @@ def mix(tmp_path: Path) -> Any:
 
 
 def test_a_mix_restores_all_lights_and_the_environment(mix: Any) -> None:
-    assert {light["kind"] for light in DEFAULT["lights"].values()} == set(UNITS)
+    assert set(get_args(LightKind)) == set(UNITS)
     restored, edited = validate(mix, DEFAULT), validate(MIX, DEFAULT)
     assert restored.lights == edited.lights
     assert restored.environment == edited.environment
     assert restored.materials == validate({}, DEFAULT).materials
-    assert expand_light_mix(mix, DEFAULT) == ({"lights": mix["lights"], "environment": mix["environment"]}, [])
+    sections = {name: mix[name] for name in ("lights", "light_groups", "environment")}
+    assert expand_light_mix(mix, DEFAULT) == (sections, [])
 
 
 def test_its_sections_are_a_partial_look_that_leaves_materials_alone(mix: Any) -> None:

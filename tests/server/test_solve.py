@@ -81,6 +81,19 @@ def test_without_a_target_nothing_changes(client: TestClient, baked: Baked) -> N
     assert answer["look"] == {"lights": {"Key": KEY_LIGHT}}
 
 
+def test_materials_follow_by_request(client: TestClient, baked: Baked) -> None:
+    """Only the material can change, so its terms are replaced in the patch and in the partial look."""
+    picture = png_bytes(np.full((48, 80, 3), 100, np.uint8))
+    look = {"display": {"tone_map": "none"}}
+    fields = {"look": look, "reference": {"image": encoded(picture)}, "locked": ["/environment"]}
+    answer = solve(client, baked, **fields, materials=["Paper"])
+    (operation,) = answer["patch"]
+    assert (operation["path"], answer["materials"]) == ("/materials/Paper/terms", ["Paper"])
+    assert answer["look"]["materials"]["Paper"]["terms"] == operation["value"]
+    assert answer["residual"] < 0.5 * answer["residual_before"]
+    assert solve(client, baked, **fields)["materials"] == []
+
+
 @pytest.mark.parametrize(
     "fields",
     [
@@ -99,6 +112,8 @@ def test_without_a_target_nothing_changes(client: TestClient, baked: Baked) -> N
         {"strokes": [{"kind": "brighter", "points": LEFT}] * 65},
         {"strokes": [{"kind": "brighter", "points": LEFT * 2049}]},
         {"reference": {"image": encoded(b"no picture")}},
+        {"materials": ["Paper"] * 33},
+        {"strokes": [{"kind": "brighter", "points": LEFT}], "materials": ["Ghost"]},
     ],
 )
 def test_invalid_requests_are_refused(client: TestClient, baked: Baked, fields: dict[str, Any]) -> None:

@@ -17,6 +17,7 @@ from relume.inverse_lighting.match_look import LookMatch, MatchRequest, match_lo
 from relume.inverse_lighting.painting import Stroke, brush_mask
 from relume.inverse_lighting.sources import merge_changes
 from relume.live.fixed_camera.protocols import CameraMode, OpenBake
+from relume.look.light_mix import expand_light_mix
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.renders import baked_view, check_look, check_picture_size
 from relume_server.runtime.protocols import F32, Library
@@ -31,15 +32,21 @@ IMAGE_WIDTH = 160
 
 @router.post("", name="solve_look")
 async def solve(request: SolveRequest, services: ServicesDep) -> SolveBody:
-    """Return the look whose lights come nearest to a target. The first call for a view renders an image of each light;
-    without strokes and reference it does nothing else.
+    """Return the look whose lights, and materials by request, come nearest to a target. The first call for a view
+    renders an image of each light; without strokes and reference it does nothing else.
     """
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
-        return await run_in_threadpool(_solve, request, transfer, services.live.library)
+        return await run_in_threadpool(solve_request, request, transfer, services.live.library)
 
 
-def _solve(request: SolveRequest, transfer: OpenBake, library: Library) -> SolveBody:
+def solve_request(request: SolveRequest, transfer: OpenBake, library: Library) -> SolveBody:
+    """Solve a request with an opened bake.
+
+    Raises:
+        ParameterError: the request does not fit the bake. SceneError: a picture cannot be read. EditError: the image is
+            not linear in the lights.
+    """
     check_look(request.look, transfer, "/look")
     look = looks.validate(request.look, transfer.default_look)
     camera_and_size, size = _camera(request, transfer)
@@ -55,9 +62,10 @@ def _solve(request: SolveRequest, transfer: OpenBake, library: Library) -> Solve
             locked=frozenset(request.locked),
             changes_color=_changes_color(request),
             rotates=request.rotate,
+            materials=frozenset(request.materials),
         ),
     )
-    return _body(request, look, match)
+    return _body(request, transfer, match)
 
 
 def _camera(request: SolveRequest, transfer: OpenBake) -> tuple[Any, tuple[int, int]]:
@@ -95,14 +103,16 @@ def _mask(stroke: StrokeBody, scale: tuple[float, float], small: tuple[int, int]
     return brush_mask(points, stroke.radius * scale[0], small)
 
 
-def _body(request: SolveRequest, look: looks.Look, solved: LookMatch) -> SolveBody:
+def _body(request: SolveRequest, transfer: OpenBake, solved: LookMatch) -> SolveBody:
     match, has_strokes = solved.match, bool(request.strokes)
+    partial, _ = expand_light_mix(request.look, transfer.default_look)  # which has no materials
     return SolveBody(
         patch=[PatchOperation(**operation) for operation in solved.operations],
-        look=merge_changes(request.look, solved.operations),
+        look=merge_changes(partial, solved.operations),
         residual=match.residual,
         residual_before=match.residual_before,
         changes=[SourceChange(pointer=pointer, stops=stops) for pointer, stops in match.stops.items()],
+        materials=list(solved.materials),
         shortfalls=[
             ShortfallBody.from_object(each, stroke=each.region if has_strokes else None) for each in match.shortfalls
         ],

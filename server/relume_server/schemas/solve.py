@@ -15,6 +15,7 @@ from relume_server.schemas.renders import Side
 MAX_STROKES = 64
 MAX_STROKE_POINTS = 2048
 MAX_LOCKED = 1024
+MAX_MATERIALS = 32
 Pointer = Annotated[str, Field(max_length=1024)]
 Pixels = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
 Stops = Annotated[float, Field(ge=0.0, le=10.0, allow_inf_nan=False)]
@@ -54,6 +55,8 @@ class SolveRequest(Body):
     Without strokes, the whole image is to look as the `reference`. `locked`: JSON pointers of lights that stay, such as
     `/lights/Key` or `/environment`. `change`: intensities alone, or colors, too; by default colors, too, unless all
     strokes are `brighter` or `darker`. `rotate`: the environment may rotate, which renders it about 25 times.
+    `materials`: names of materials whose colors and parameters may change; at most 12 steps, each of which renders an
+    image of each light and one of each number.
     """
 
     bake: Id
@@ -66,6 +69,7 @@ class SolveRequest(Body):
     locked: Annotated[list[Pointer], Field(default_factory=list, max_length=MAX_LOCKED)]
     change: Literal["intensity", "color"] | None = None
     rotate: bool = False
+    materials: Annotated[list[Name], Field(default_factory=list, max_length=MAX_MATERIALS)]
 
 
 class SourceChange(Body):
@@ -92,6 +96,7 @@ class ShortfallBody(Body):
 
 class SolveBody(Body):
     """The solution. `patch`: JSON Patch on the complete look; `look`: the look of the request with these changes.
+    `changes`: changed lights; `materials`: names of changed materials, whose terms the patch replaces.
     `residual`, `residual_before`: relative RMS error of the marked pixels; 0 if none are marked.
     """
 
@@ -100,4 +105,5 @@ class SolveBody(Body):
     residual: float
     residual_before: float
     changes: list[SourceChange]
+    materials: list[str]
     shortfalls: list[ShortfallBody]

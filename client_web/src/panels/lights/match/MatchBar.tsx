@@ -9,6 +9,7 @@ import { MatchLock } from "../MatchLock";
 import {
   brushRadius,
   changesColor,
+  changesMaterials,
   ENVIRONMENT_POINTER,
   fitsExposure,
   matchPicture,
@@ -152,6 +153,14 @@ function OpenBar() {
         onChange={(value) => (brushRadius.value = value)}
       />
       <MatchLock label="environment" pointer={ENVIRONMENT_POINTER} />
+      <label title="When a stroke ends, also change the materials painted on; takes seconds">
+        <input
+          type="checkbox"
+          checked={changesMaterials.value}
+          onChange={(event) => (changesMaterials.value = event.currentTarget.checked)}
+        />
+        Materials
+      </label>
       <Reference />
       <button title="Close (Esc)" onClick={toggleMatch}>
         Close

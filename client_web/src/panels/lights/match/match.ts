@@ -6,11 +6,13 @@ import type { Look, Rgb, ShortfallBody, SolveBody, SolveRequest, StrokeBody } fr
 import { stage } from "../../../render/renderStage";
 import { solveLook } from "../../../session/net/api";
 import { LatestRequest } from "../../../session/net/latestRequest";
+import { requestPixelProbe } from "../../../session/pixelProbe";
 import { bake } from "../../../state/bakes";
 import { changeByPatch } from "../../../state/document/jsonPatch";
 import { look } from "../../../state/look";
 import { isMatchOpen, lockedPointers } from "../../../state/match";
 import { activeViewName } from "../../../state/views";
+import { reportErrors } from "../../../ui/toasts";
 import { cameraOf } from "../../../viewport/cameras/freeCamera";
 
 export type StrokeKind = StrokeBody["kind"];
@@ -26,11 +28,14 @@ export const changesColor = signal(true);
 export const referencePicture = signal<{ name: string; image: string } | null>(null);
 /** True if only the relative brightness of the reference picture counts. */
 export const fitsExposure = signal(false);
+/** True if the materials painted on may change, too, when a stroke ends. */
+export const changesMaterials = signal(false);
 /** True if the environment may rotate when the whole picture is matched. */
 export const rotatesEnvironment = signal(false);
 export const matchStatus = signal("");
 
 const MAX_POINTS = 2000;
+const MAX_PROBES = 8;
 const HINT = "Paint over the picture. The lights follow. Esc: cancel.";
 const PREPARING = "Preparing an image of each light…";
 const SOLVING = "Finding the lights…";
@@ -57,7 +62,8 @@ export const gesture = signal<Gesture | null>(null);
 interface SolveInput {
   body: SolveRequest;
   gesture: Gesture | null;
-  numPoints: number;
+  /** True for the request at the end of a stroke, whose answer makes it a step. */
+  isFinal: boolean;
 }
 
 const requests = new LatestRequest(
@@ -78,7 +84,7 @@ function showAnswer(input: SolveInput, answer: SolveBody): void {
   if (input.gesture !== gesture.peek()) return; // canceled
   previewStep(input.gesture.label, changeByPatch(input.gesture.before, answer.patch).after);
   matchStatus.value = resultText(answer);
-  if (input.gesture.isEnded && input.numPoints === input.gesture.points.length) {
+  if (input.isFinal) {
     gesture.value = null;
     commitPreview();
   }
@@ -95,9 +101,10 @@ function shortfallText({ asked_stops: asked, reached_stops: reached, cause }: Sh
 }
 
 /** The result of a match as text. */
-export function resultText({ residual, changes, shortfalls }: SolveBody): string {
+export function resultText({ residual, changes, materials, shortfalls }: SolveBody): string {
   const lights = changes.length === 1 ? "1 light" : `${changes.length || "No"} lights`;
-  return [`${lights} changed. Residual ${(100 * residual).toFixed(1)} %.`, ...shortfalls.map(shortfallText)].join(" ");
+  const changed = [lights, ...materials].join(", ");
+  return [`${changed} changed. Residual ${(100 * residual).toFixed(1)} %.`, ...shortfalls.map(shortfallText)].join(" ");
 }
 
 /** A request for the look before a gesture, without a target. */
@@ -126,7 +133,21 @@ function referenceBody(): Pick<SolveRequest, "reference"> {
   return picture === null ? {} : { reference: { image: picture.image, fit_exposure: fitsExposure.peek() } };
 }
 
-function sendGesture(current: Gesture): void {
+/** Materials under the points of a stroke; in free-camera views the server picks them, at some of the points. */
+async function paintedMaterials({ view, points }: Gesture): Promise<string[]> {
+  const image = stage.imageOf(view);
+  const isFree = cameraOf(view) !== null;
+  const every = isFree ? Math.ceil(points.length / MAX_PROBES) : 1;
+  const materials = new Set<string>();
+  for (const [x, y] of points.filter((_, k) => k % every === 0)) {
+    const [px, py] = [Math.floor(x), Math.floor(y)];
+    const material = isFree ? (await requestPixelProbe(view, px, py)).material : image.material(px, py);
+    if (material !== null) materials.add(material);
+  }
+  return [...materials];
+}
+
+function sendGesture(current: Gesture, materials: string[] = []): void {
   const base = baseRequest(current.view, current.before);
   if (base === null) return;
   const kind = strokeKind.peek();
@@ -145,9 +166,9 @@ function sendGesture(current: Gesture): void {
   const needsPicture = strokes.length === 0 || kind === "reference";
   const change = kind === "color" || (needsPicture && changesColor.peek()) ? "color" : "intensity";
   const rotate = strokes.length === 0 && rotatesEnvironment.peek();
-  const body = { ...base, strokes, change, rotate, ...(needsPicture ? referenceBody() : {}) } satisfies SolveRequest;
+  const body = { ...base, strokes, change, rotate, materials, ...(needsPicture ? referenceBody() : {}) } satisfies SolveRequest;
   matchStatus.value = matchStatus.peek() === PREPARING ? PREPARING : matchStatus.peek() || SOLVING;
-  requests.send({ body, gesture: current, numPoints: current.points.length });
+  requests.send({ body, gesture: current, isFinal: current.isEnded });
 }
 
 const LABELS: Record<StrokeKind, string> = {
@@ -187,7 +208,11 @@ export function endStroke(): void {
   const current = gesture.peek();
   if (current === null || current.isEnded) return;
   current.isEnded = true;
-  sendGesture(current);
+  if (!changesMaterials.peek()) return sendGesture(current);
+  void reportErrors(async () => {
+    const materials = await paintedMaterials(current);
+    if (gesture.peek() === current) sendGesture(current, materials);
+  });
 }
 
 /** Match the whole image to the reference picture. */
@@ -238,5 +263,5 @@ effect(() => {
   const body = current === null || view === "" ? null : baseRequest(view, current);
   if (body === null) return;
   matchStatus.value = PREPARING;
-  requests.send({ body, gesture: null, numPoints: 0 });
+  requests.send({ body, gesture: null, isFinal: false });
 });
