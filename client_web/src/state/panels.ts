@@ -15,6 +15,8 @@ export const histogramOpen = signal(false);
 /** True if spots and panels keep aiming at the same point while moved. */
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
+/** How the inspector shows a material: as principled parameters, or as terms. */
+export const materialMode = signal<"principled" | "terms">("terms");
 /** Titles of collapsed panel sections. */
 export const foldedSections = signal<readonly string[]>([]);
 
@@ -31,6 +33,7 @@ const STORED_PANELS: Record<string, Signal<unknown>> = {
   histogramOpen,
   aimLocked,
   folded: foldedSections,
+  materialMode,
   exrSpace,
 };
 const PANELS_KEY = "relume.panels";
