@@ -257,7 +257,7 @@ _GLASS_REASON = "Its glass has another roughness than its highlight."
 
 
 def _reason(terms: Sequence[Mapping[str, Any]]) -> str:
-    """Why terms are not those of a principled material."""
+    """The reason that no principled material has these terms, a sentence."""
     if any(term.get("data") is not None for term in terms):
         return "It has measured layers."
     if any(term["model"] not in _MODELS for term in terms):

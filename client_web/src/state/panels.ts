@@ -15,7 +15,7 @@ export const histogramOpen = signal(false);
 /** True if spots and panels keep aiming at the same point while moved. */
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
-/** How the inspector shows a material: as principled parameters, or as terms. */
+/** Mode of the inspector: a material as principled parameters, or as terms. */
 export const materialMode = signal<"principled" | "terms">("terms");
 /** Titles of collapsed panel sections. */
 export const foldedSections = signal<readonly string[]>([]);

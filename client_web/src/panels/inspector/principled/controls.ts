@@ -61,7 +61,7 @@ export function isShown({ name, needs }: Control, parameters: PrincipledParamete
   return needs === undefined || parameters[needs] > 0;
 }
 
-/** Why a material has no principled parameters, and the error of the closest ones. */
+/** The reason that a material has no principled parameters, and the error of the closest ones. */
 export function closestText(reason: string, error: number): string {
   const percent = error < 0.01 ? "less than 1 %" : `${Math.round(100 * error)} %`;
   return `${reason} The closest principled material differs by ${percent} (relative RMS).`;
