@@ -134,7 +134,8 @@ def complete_parameters(pointer: Pointer, given: Any) -> PrincipledMaterial:
     for name, value in given.items():
         check = check_triple if isinstance(defaults[name], tuple) else check_number
         check((*pointer, name), value, *PRINCIPLED_RANGES[name])
-    return PrincipledMaterial(**{name: tuple(v) if isinstance(v, list) else v for name, v in given.items()})
+    values: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in given.items()}
+    return PrincipledMaterial(**values)
 
 
 def texture_means(material: Material, terms: Sequence[Mapping[str, Any]]) -> TextureMeans:
