@@ -293,6 +293,7 @@ export const RANGES = {
   display: { exposure: { minimum: -20, maximum: 20 }, temperature: { minimum: 2800, maximum: 15000 }, tint: { minimum: -50, maximum: 50 } },
   light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000000000 }, position: { minimum: -1000000000, maximum: 1000000000 }, direction: { minimum: -1000000000, maximum: 1000000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 1e-08, maximum: 100000000 }, radius: { minimum: 0.0001, maximum: 10000 }, length: { minimum: 0.0001, maximum: 10000 }, angle: { minimum: 0, maximum: 30 }, cone: { minimum: 0, maximum: 90 } },
   glass: { color: { minimum: 0, maximum: 1 }, absorption: { minimum: 0, maximum: 1000000 }, roughness: { minimum: 0, maximum: 1 }, ior: { minimum: 1, maximum: 4 } },
+  principled: { base_color: { minimum: 0, maximum: 1 }, metallic: { minimum: 0, maximum: 1 }, roughness: { minimum: 0.01, maximum: 1 }, specular: { minimum: 0, maximum: 1 }, specular_color: { minimum: 0, maximum: 10 }, ior: { minimum: 1, maximum: 4 }, anisotropy: { minimum: 0, maximum: 1 }, coat_weight: { minimum: 0, maximum: 1 }, coat_roughness: { minimum: 0.01, maximum: 1 }, sheen_weight: { minimum: 0, maximum: 1 }, sheen_color: { minimum: 0, maximum: 1 }, sheen_roughness: { minimum: 0.07, maximum: 1 }, transmission: { minimum: 0, maximum: 1 } },
   term: { color: { minimum: 0, maximum: 10000 } },
 } as const;
 

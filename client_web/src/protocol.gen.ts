@@ -148,6 +148,14 @@ export interface FocusMessage {
   view: string;
 }
 
+/** Light through a surface of glass; its material's terms are what it reflects. `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; not of thin glass. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`: index of refraction. */
+export interface GlassLook {
+  color: [number, number, number];
+  absorption?: [number, number, number];
+  roughness: number;
+  ior: number;
+}
+
 /** client → server: show the pixels that a curve's interval affects; each visible view answers "highlight". */
 export interface HighlightMessage {
   type: "highlight_curve_range";
@@ -225,6 +233,22 @@ export interface PresenceMessage {
   type: "presence";
   name?: string | null;
   material?: string | null;
+}
+
+/** Terms and glass of a material's look. `scene` and `material` name the material of a scene whose textures the terms use; without them, its textures count as white. */
+export interface PrincipledRequest {
+  terms: Record<string, unknown>[];
+  glass?: GlassLook | null;
+  scene?: string | null;
+  material?: string | null;
+}
+
+/** Principled `parameters`, omitted ones with their defaults, and the material's own `terms` and `glass`, whose textures and absorption stay. `texture_means`: as returned with the parameters. */
+export interface PrincipledTermsRequest {
+  terms: Record<string, unknown>[];
+  parameters: Record<string, unknown>;
+  glass?: GlassLook | null;
+  texture_means?: TextureMeansBody | null;
 }
 
 /** A reference picture: `image`, the file in base64. PNG, JPEG and WebP have display values, from which exposure and tone mapping of the look are removed; HDR and OpenEXR have linear radiance. `fit_exposure`: only its relative brightness counts. */
@@ -332,6 +356,12 @@ export interface SyntheticBtfRequest {
 /** Terms, as in a look. */
 export interface TermsRequest {
   terms: Record<string, unknown>[];
+}
+
+/** Mean of the texture of each channel, linear RGB; ones without a texture. */
+export interface TextureMeansBody {
+  diffuse: [number, number, number];
+  specular: [number, number, number];
 }
 
 /** One revolution about a vertical axis, in so many frames; `start_camera`: of the first frame, by default the view's. `pivot`: a point on the axis, meters; by default the center of the first image, at the depth of its surface. `rotate`: the `camera`; or the `object`, with fixed camera, environment and lights; or the `environment` alone, which needs no free camera. */
@@ -916,6 +946,33 @@ export interface PlanBody {
 /** server → client: answer to a `PingMessage`. */
 export interface PongMessage {
   type: "pong";
+}
+
+/** Principled `parameters` of a material. If they have its terms, `reason` is null; otherwise `parameters`, `terms` and `glass` are those of the closest principled material, `error` is its relative RMS error of cosine-weighted BRDF values, and `reason` a sentence. */
+export interface PrincipledBody {
+  terms: Record<string, unknown>[];
+  glass: Record<string, unknown> | null;
+  parameters: PrincipledParameters;
+  error: number;
+  reason: string | null;
+  texture_means: TextureMeansBody;
+}
+
+/** Principled parameters, see docs/guide: colors are linear Rec. 709, roughness is perceptual. */
+export interface PrincipledParameters {
+  base_color: [number, number, number];
+  metallic: number;
+  roughness: number;
+  specular: number;
+  specular_color: [number, number, number];
+  ior: number;
+  anisotropy: number;
+  coat_weight: number;
+  coat_roughness: number;
+  sheen_weight: number;
+  sheen_color: [number, number, number];
+  sheen_roughness: number;
+  transmission: number;
 }
 
 /** RFC 9457 problem. `type` is the kind, `detail` says what happened and what to do. */

@@ -47,6 +47,9 @@ export type {
   PathAnswer,
   PathBody,
   Problem,
+  PrincipledParameters,
+  PrincipledRequest,
+  PrincipledTermsRequest,
   ProblemMessage,
   RenderBody,
   MixedLookBody,
@@ -122,6 +125,8 @@ export type LibraryMaterialBody = Omit<gen.LibraryMaterialBody, "terms" | "norma
 };
 export type ImportedBody = Omit<gen.ImportedBody, "materials"> & { materials: LibraryMaterialBody[] };
 export type BtfBody = Omit<gen.BtfBody, "terms"> & { terms: Term[] };
+export type PrincipledTermsBody = { terms: Term[]; glass: MaterialLook["glass"] };
+export type PrincipledBody = Omit<gen.PrincipledBody, keyof PrincipledTermsBody> & PrincipledTermsBody;
 export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 
 /** A shared state; its look is complete. */

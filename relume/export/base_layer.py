@@ -37,6 +37,9 @@ _PLAIN_F0 = 0.2  # about that of gems; higher ones are partly metal if they can
 _MAX_F0 = 0.36  # of an index of refraction of 4
 _TOLERANCE = 0.01  # of a blend
 _WHITE_TOLERANCE = 0.02
+_GRAY_TOLERANCE = 1e-4
+_MIN_COLOR = 0.01  # difference of the channels of an albedo that tells its color
+_BLACK_DIELECTRIC_F0 = 0.08  # of an index of refraction of 1.8
 
 
 @dataclass(frozen=True)
@@ -86,8 +89,10 @@ def pbr_surface(parameters: SurfaceParameters) -> PbrSurface:
 def _uniform_layer(surface: PbrSurface, glass: Glass | None) -> dict[str, Any]:
     albedo, f0, f90 = surface.diffuse, surface.f0, min(surface.f90, 1.0)
     is_white_at_grazing = f90 > 1 - _WHITE_TOLERANCE
-    if glass is None and albedo.max() < _BLACK and is_white_at_grazing:
+    if glass is None and albedo.max() < _BLACK and is_white_at_grazing and not _is_black_dielectric(f0):
         return {"base_color": rgb(f0), "metallic": 1.0}
+    if glass is None and (blend := _colored_blend(albedo, f0, f90)) is not None:
+        return blend
     if glass is None and is_white_at_grazing and (f0 / f90).max() > _PLAIN_F0:
         base, metallic = _solve_blend(albedo, f0)
         if _blend_error(albedo, f0, base, metallic) < _TOLERANCE:
@@ -95,12 +100,41 @@ def _uniform_layer(surface: PbrSurface, glass: Glass | None) -> dict[str, Any]:
     return _dielectric_layer(albedo, f0, f90, glass)
 
 
+def _is_black_dielectric(f0: F64) -> bool:
+    """True for the gray reflectance of plastics and glass; no metal is as dark."""
+    return bool(np.ptp(f0) < _GRAY_TOLERANCE and f0.max() < _BLACK_DIELECTRIC_F0)
+
+
+def _colored_blend(albedo: F64, f0: F64, f90: float) -> dict[str, Any] | None:
+    """The blend of a metal and a dielectric with white specular color, if the albedo has a color and it is one.
+
+    With f90 = m + (1 - m) s, f0 = A + B L over the channels, A = (1 - m) s f and B = m / ((1 - m)(1 - R)), where
+    R = s (f + (1 - f) r) with the constant r of `dielectric_reflectance`; so m is linear in A and B.
+    """
+    deviation = albedo - albedo.mean()
+    if np.ptp(albedo) < _MIN_COLOR or f90 <= 0:
+        return None
+    slope = float(deviation @ f0 / (deviation @ deviation))
+    offset = float(f0.mean() - slope * albedo.mean())
+    rise = dielectric_reflectance(0.0, 1.0)
+    metallic = slope * (1 - offset - (f90 - offset) * rise) / (1 + slope * (1 - rise))
+    metallic = 0.0 if abs(metallic) < _GRAY_TOLERANCE else metallic
+    weight = f90 - metallic  # (1 - m) s
+    is_blend = np.abs(offset + slope * albedo - f0).max() < _GRAY_TOLERANCE and 0 <= metallic < min(1, f90)
+    if not is_blend or not 0 <= offset <= _MAX_F0 * weight:
+        return None
+    base = albedo / (1 - metallic - dielectric_reflectance(offset, weight))
+    ior = index_of_refraction(offset / weight)
+    layer = {"base_color": rgb(np.minimum(base, 1)), "metallic": metallic}
+    return layer | {"specular": weight / (1 - metallic), "ior": ior} if base.max() < 1 + _GRAY_TOLERANCE else None
+
+
 def _dielectric_layer(albedo: F64, f0: F64, f90: float, glass: Glass | None) -> dict[str, Any]:
     relative = f0 / f90 if f90 > 0 else np.zeros(3)
     f = min(float(relative.max()), _MAX_F0) if glass is None else normal_reflectance(glass.ior)
     color = relative / f if f > 0 else np.ones(3)
     reflectance = dielectric_reflectance(min(float(relative.max()), 1.0) * f90, f90)
-    base = albedo / (1 - reflectance)
+    base = albedo / max(1 - reflectance, _BLACK)  # of a mirror that is white at all angles
     layer = {
         "specular": f90,
         "specular_color": rgb(color),

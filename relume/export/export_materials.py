@@ -100,8 +100,8 @@ class MaterialExporter:
     ) -> ExportMaterial:
         material = with_glass_look(self._scene.materials[index], look.glass)
         terms = [dict(term) for term in look.terms]
-        maps, roughness_map = _maps(material, terms), _roughness_map(material, terms)
-        mean_terms = _at_mean(terms, maps)
+        maps, roughness_map = term_maps(material, terms), _roughness_map(material, terms)
+        mean_terms = at_mean(terms, maps.means())
         fit = _fit(json.dumps(mean_terms))
         layer = base_layer(fit.surface, maps, material.glass, self._images, material.name)
         uniform = base_layer(fit.surface, Maps(), material.glass, self._images, material.name)
@@ -203,7 +203,7 @@ def _parameters(layer: Mapping[str, Any], fit: PrincipledFit) -> SurfaceParamete
     )
 
 
-def _maps(material: Material, terms: Sequence[Mapping[str, Any]]) -> Maps:
+def term_maps(material: Material, terms: Sequence[Mapping[str, Any]]) -> Maps:
     """Textures of the channels that terms use."""
     channels = {texture_channel(term) for term in terms}
     images = dict(zip(("diffuse", "specular"), user_images(terms), strict=True))
@@ -223,9 +223,13 @@ def _roughness_map(material: Material, terms: Sequence[Mapping[str, Any]]) -> Te
     return material.textures.get("roughness") if image is None else load_roughness_map(image)
 
 
-def _at_mean(terms: Sequence[Mapping[str, Any]], maps: Maps) -> list[dict[str, Any]]:
-    """Terms whose colors are multiplied by the mean of their textures."""
-    means = dict(zip(("diffuse", "specular"), maps.means(), strict=True))
+def at_mean(terms: Sequence[Mapping[str, Any]], texture_means: tuple[F64, F64]) -> list[dict[str, Any]]:
+    """Return the terms without textures, their colors multiplied by the mean of their textures.
+
+    Args:
+        terms: of a complete look. texture_means: of the channels "diffuse" and "specular".
+    """
+    means = dict(zip(("diffuse", "specular"), texture_means, strict=True))
     plain = []
     for term in terms:
         channel = texture_channel(term)

@@ -37,7 +37,7 @@ _LOG_ROUGHNESS = float(np.log(0.01)), 0.0
 _ROUGHNESS = np.exp(np.linspace(*_LOG_ROUGHNESS, 16))
 _ANISOTROPY = (0.3, 0.5, 0.7, 0.85, 0.95)
 _MAX_STEPS = 12
-_HIGHLIGHTS = {"ggx", "ashikhmin_shirley"}  # of imports
+HIGHLIGHTS = {"ggx", "ashikhmin_shirley"}  # of imports
 _COAT_F0_TOLERANCE = 0.005
 _GRAY_TOLERANCE = 1e-3
 
@@ -86,8 +86,8 @@ def read_surface(terms: Terms) -> PrincipledFit | None:
     """Invert `make_terms`; None if there are other terms. The error is unknown, 0, and so are drawn curves."""
     base, coat = _peel_layers(terms)
     by_model = {term["model"]: term for term in base}
-    highlights = [term for model, term in by_model.items() if model in _HIGHLIGHTS]
-    if len(by_model) != len(base) or len(highlights) > 1 or by_model.keys() - {"lambert", *_HIGHLIGHTS}:
+    highlights = [term for model, term in by_model.items() if model in HIGHLIGHTS]
+    if len(by_model) != len(base) or len(highlights) > 1 or by_model.keys() - {"lambert", *HIGHLIGHTS}:
         return None
     diffuse = np.array(by_model["lambert"]["color"], np.float64) if "lambert" in by_model else np.zeros(3)
     surface = PbrSurface(diffuse, np.zeros(3), 0.0, 1.0)
@@ -118,7 +118,7 @@ def _peel_layers(terms: Terms) -> tuple[list[Mapping[str, Any]], CoatLayer]:
     """The terms below sheen and coat, and these two if the terms have them."""
     base, coat = list(terms), CoatLayer()
     below = {term["model"] for term in base[:-1]}
-    if below & _HIGHLIGHTS and _is_coat(base[-1]):
+    if below & HIGHLIGHTS and _is_coat(base[-1]):
         layer = base.pop()
         weight, roughness = float(np.mean(layer["color"])), float(np.mean(layer["params"]["roughness"]))
         coat = replace(coat, coat=weight, coat_roughness=roughness)

@@ -16,6 +16,7 @@ from pydantic.json_schema import models_json_schema
 
 from relume.brdf.term_validation import MAX_CURVE_VALUE, MAX_POINTS
 from relume.core.validation import MAX_COLOR
+from relume.export.principled_material import PRINCIPLED_RANGES
 from relume.image_io.ocio.lut import GAIN, SIZE
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look import LightLook, Look
@@ -91,6 +92,8 @@ INPUTS: tuple[type[BaseModel], ...] = (
     renders.RenderRequest,
     models.TermsRequest,
     models.ZernikeFitRequest,
+    models.PrincipledRequest,
+    models.PrincipledTermsRequest,
     bodies.ComparisonRequest,
     exports.ExportRequest,
     bodies.ShareRequest,
@@ -114,6 +117,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
     models.ModelBody,
     models.ZernikeFitBody,
     models.AlbedoBody,
+    models.PrincipledBody,
     bodies.MaterialBody,
     bodies.MaterialMapBody,
     bodies.EnvironmentBody,
@@ -189,7 +193,12 @@ def generate_look() -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-_EXTRA_RANGES = {"light": LIGHT_RANGES, "glass": GLASS_RANGES, "term": {"color": (0.0, MAX_COLOR)}}
+_EXTRA_RANGES = {
+    "light": LIGHT_RANGES,
+    "glass": GLASS_RANGES,
+    "principled": PRINCIPLED_RANGES,
+    "term": {"color": (0.0, MAX_COLOR)},
+}
 _CONSTANTS = {
     "MAX_TERMS": MAX_TERMS,
     "BASIS_FUNCTIONS": get_args(BasisFunctions),

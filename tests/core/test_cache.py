@@ -149,6 +149,7 @@ BOUNDED = {
     "core/numba_cache.py",
     "core/source_hash.py",
     "export/export_materials.py",
+    "export/principled_material.py",
     "export/surface_values.py",
     "image_io/inverse_tone_mapping.py",
     "image_io/ocio/config.py",

@@ -1,14 +1,16 @@
 /** All changes of the look go through here: an undoable step, and its patch to the server. A previewed look, as during
  * playback, becomes a step when the user commits or edits it. */
 import { signal } from "@preact/signals";
-import { changeValue, changeToLook, type LookChange } from "../state/document/jsonPatch";
+import { changeValue, changeToLook, joinChanges, type LookChange } from "../state/document/jsonPatch";
 import { isViewSetting } from "../state/document/pointer";
 import type { Look } from "../protocol";
 import { look } from "../state/look";
 import { mayEdit, numRejectedEdits } from "../state/sessionUser";
 import { models } from "../state/scene";
+import { selectedMaterials } from "../state/selection";
 import { activeControl, activePath } from "./activeControl";
 import { history } from "./history";
+import { sharedPaths } from "./sharedPaths";
 import { stepLabel } from "./stepLabel";
 
 type ChangeListener = (change: LookChange, inputTime: number) => void;
@@ -71,11 +73,17 @@ function rejectIfReadOnly(): boolean {
   return !mayEdit.peek();
 }
 
-function commitChange(label: string, change: LookChange, key?: string): void {
+interface StepKey {
+  key?: string;
+  gesture?: number;
+}
+
+function commitChange(label: string, change: LookChange, step: StepKey = {}, control: string | null = null): void {
+  const { key } = step;
   if (change.patch.length === 0 || (!(key !== undefined && isViewSetting(key)) && rejectIfReadOnly())) return;
   commitPreview();
-  applyChange(change, key === undefined ? null : activePath(key, change.after));
-  history.record({ kind: "look", label, ...(key === undefined ? {} : { key }), ...change });
+  applyChange(change, control);
+  history.record({ kind: "look", label, ...step, ...change });
 }
 
 /** Replace the edited look, as one step. */
@@ -83,8 +91,30 @@ export function replaceLook(label: string, next: Look): void {
   if (look.value !== null) commitChange(label, changeToLook(look.value, next));
 }
 
-/** Set the value at a pointer of the look (undefined removes it). Edits of one gesture on one pointer are one step. */
+/** Set the value at a pointer of the look (undefined removes it), also in other selected materials that have it. Edits
+ * of one gesture on one pointer are one step. */
 export function editValue(action: string, path: string, value: unknown): void {
   if (look.value === null) return;
-  commitChange(stepLabel(path, action, look.value, models.value), changeValue(look.value, path, value), path);
+  const others = sharedPaths(look.value, path, selectedMaterials.peek());
+  const change = others.reduce(
+    (joined, other) => joinChanges(joined, changeValue(joined.after, other, value)),
+    changeValue(look.value, path, value),
+  );
+  const control = others.length > 0 ? null : activePath(path, change.after);
+  commitChange(labelOf(path, action, others.length), change, { key: path }, control);
+}
+
+/** Replace the look as an edit of the value at a pointer, by a gesture that may have ended (`history.continueGesture`);
+ * all its edits are one step. */
+export function editLook(action: string, path: string, next: Look, gesture: number, numOthers = 0): void {
+  if (look.value === null) return;
+  const change = changeToLook(look.value, next);
+  const [first, second] = change.patch;
+  const control = first === undefined || second !== undefined ? null : activePath(first.path, next);
+  commitChange(labelOf(path, action, numOthers), change, { key: path, gesture }, control);
+}
+
+function labelOf(path: string, action: string, numOthers: number): string {
+  const label = stepLabel(path, action, look.value as Look, models.value);
+  return numOthers === 0 ? label : `${label} (${numOthers + 1} materials)`;
 }

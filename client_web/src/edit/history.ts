@@ -8,6 +8,8 @@ export interface LookStep extends LookChange {
   label: string;
   /** Consecutive steps of a gesture with the same key are merged. */
   key?: string;
+  /** Steps of the same gesture and key are merged also after its end, for changes that the server computes. */
+  gesture?: number;
 }
 
 /** A saved look; `created`: time of its first save, by which saved looks are sorted; `view`: the view saved with it. */
@@ -65,6 +67,7 @@ export class History {
   /** Number of done steps; the later ones can be redone. */
   readonly cursor = signal(0);
   private isGestureEnded = true;
+  private gesture = 0;
   private lastTime = 0;
   /** Target of a running undo or redo: number of done steps at its end. */
   private target: number | null = null;
@@ -83,21 +86,36 @@ export class History {
   record(step: Step): void {
     const done = this.steps.value.slice(0, this.cursor.value);
     const last = done.at(-1);
-    const idle = this.now() - this.lastTime > IDLE_MS;
+    const gesture = step.kind === "look" ? step.gesture : undefined;
+    const isSameGesture =
+      gesture === undefined
+        ? !this.isGestureEnded && !this.isIdle()
+        : last?.kind === "look" && gesture === last.gesture;
     if (
       step.kind === "look" &&
       last?.kind === "look" &&
       step.key !== undefined &&
       step.key === last.key &&
-      !this.isGestureEnded &&
-      !idle
+      isSameGesture
     ) {
       done[done.length - 1] = { ...step, ...joinChanges(last, step) };
     } else done.push(step);
     this.steps.value = done.slice(-MAX_STEPS);
     this.cursor.value = this.steps.value.length;
     this.lastTime = this.now();
+    if (gesture === undefined) this.isGestureEnded = false; // else it may have ended
+  }
+
+  private isIdle(): boolean {
+    return this.now() - this.lastTime > IDLE_MS;
+  }
+
+  /** The number of the running gesture, or of a new one, for the `gesture` of later steps. */
+  continueGesture(): number {
+    if (this.isGestureEnded || this.isIdle()) this.gesture += 1;
     this.isGestureEnded = false;
+    this.lastTime = this.now();
+    return this.gesture;
   }
 
   /** End the gesture: the next change is another step. */

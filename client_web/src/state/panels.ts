@@ -17,6 +17,8 @@ export const scope = signal<Scope>("histogram");
 /** True if spots and panels keep aiming at the same point while moved. */
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
+/** Mode of the inspector: a material as principled parameters, or as terms. */
+export const materialMode = signal<"principled" | "terms">("terms");
 /** Titles of collapsed panel sections. */
 export const foldedSections = signal<readonly string[]>([]);
 
@@ -34,6 +36,7 @@ const STORED_PANELS: Record<string, Signal<unknown>> = {
   scope,
   aimLocked,
   folded: foldedSections,
+  materialMode,
   exrSpace,
 };
 const PANELS_KEY = "relume.panels";

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from relume.look.document import MAX_TERMS
-from relume.look.model import BasisFunctions
-from relume_server.schemas.base import Body, Name
+from relume.look.model import BasisFunctions, Rgb
+from relume_server.schemas.base import Body, Id, Name
 
 
 class ParameterBody(Body):
@@ -101,3 +101,67 @@ class AlbedoBody(Body):
     mean: list[float]
     max: float
     max_angle_degrees: float
+
+
+class TextureMeansBody(Body):
+    """Mean of the texture of each channel, linear RGB; ones without a texture."""
+
+    diffuse: Rgb
+    specular: Rgb
+
+
+class PrincipledRequest(TermsRequest):
+    """Terms and glass of a material's look. `scene` and `material` name the material of a scene whose textures the
+    terms use; without them, its textures count as white.
+    """
+
+    glass: dict[str, Any] | None = None
+    scene: Id | None = None
+    material: Name | None = None
+
+
+class PrincipledTermsRequest(TermsRequest):
+    """Principled `parameters`, omitted ones with their defaults, and the material's own `terms` and `glass`, whose
+    textures and absorption stay. `texture_means`: as returned with the parameters.
+    """
+
+    parameters: dict[str, Any]
+    glass: dict[str, Any] | None = None
+    texture_means: TextureMeansBody | None = None
+
+
+class PrincipledParameters(Body):
+    """Principled parameters, as in docs/api.md: colors are linear Rec. 709, roughness is perceptual."""
+
+    base_color: Rgb
+    metallic: float
+    roughness: float
+    specular: float
+    specular_color: Rgb
+    ior: float
+    anisotropy: float
+    coat_weight: float
+    coat_roughness: float
+    sheen_weight: float
+    sheen_color: Rgb
+    sheen_roughness: float
+    transmission: float
+
+
+class PrincipledTermsBody(Body):
+    """Terms of principled parameters; `glass` is null for an opaque material."""
+
+    terms: list[dict[str, Any]]
+    glass: dict[str, Any] | None
+
+
+class PrincipledBody(PrincipledTermsBody):
+    """Principled `parameters` of a material. If they have its terms, `reason` is null; otherwise `parameters`, `terms`
+    and `glass` are those of the closest principled material, `error` is its relative RMS error of cosine-weighted BRDF
+    values, and `reason` a sentence.
+    """
+
+    parameters: PrincipledParameters
+    error: float
+    reason: str | None
+    texture_means: TextureMeansBody

@@ -11,17 +11,32 @@ import { LightInspector } from "../lights/LightInspector";
 import { openLight } from "../lights/lightEdits";
 import { MAX_TERMS } from "../../look.gen";
 import { defaultLook, look } from "../../state/look";
+import { materialMode } from "../../state/panels";
 import { shownPanels } from "../../state/panelWidths";
 import { materialOf, models } from "../../state/scene";
-import { selectedCurve, selectedLight, selectedMaterial, selectedTerm, selectedTerms } from "../../state/selection";
+import {
+  selectedCurve,
+  selectedLight,
+  selectedMaterial,
+  selectedMaterials,
+  selectedTerm,
+  selectedTerms,
+} from "../../state/selection";
 import type { Term } from "../../protocol";
 import { IconButton } from "../../ui/IconButton";
+import { RadioRow, type RadioOption } from "../../ui/RadioRow";
 import { Section } from "../../ui/Section";
 import { AlbedoInfo } from "./AlbedoInfo";
 import { GlassControls } from "./glass/GlassControls";
+import { PrincipledView } from "./principled/PrincipledView";
 import { TermCard } from "./TermCard";
 import { BasisFunctions } from "./ZernikeFit";
 import { defaultTerm, isMirror, LIGHT_VIEW, lightViewTerm, modelsFor } from "./terms";
+
+const MODES: readonly RadioOption<"principled" | "terms">[] = [
+  { value: "principled", label: "Principled", title: "Base color, metallic, roughness, coat, sheen" },
+  { value: "terms", label: "Terms", title: "The layers, with their models and curves" },
+];
 
 function replaceTerms(label: string, material: string, next: unknown): void {
   history.endGesture();
@@ -120,6 +135,8 @@ function MaterialInspector() {
   const original = defaultLook.value?.materials[material];
   const materialLook = look.value?.materials[material];
   const isShadowCatcher = materialLook?.shadow_catcher === true;
+  const isPrincipled = !isShadowCatcher && materialMode.value === "principled" && materialLook !== undefined;
+  const showsTerms = !isShadowCatcher && !isPrincipled;
   return (
     <div class="panel inspector">
       <header class="panel-head">
@@ -134,10 +151,24 @@ function MaterialInspector() {
           onClick={() => editValue("Reset material", jsonPointer("materials", material), original)}
         />
       </header>
+      {selectedMaterials.value.length > 1 && (
+        <p class="aside">
+          {selectedMaterials.value.length} materials selected. Colors and parameters change in all that have them.
+        </p>
+      )}
       <ShadowCatcherToggle material={material} />
+      {!isShadowCatcher && (
+        <RadioRow
+          label="Show the material as"
+          choices={MODES}
+          selected={materialMode.value}
+          onSelect={(mode) => (materialMode.value = mode)}
+        />
+      )}
       <CausticsNote material={material} terms={selectedTerms.value} />
       {!isShadowCatcher && <BaseColorImage key={material} material={material} terms={selectedTerms.value} />}
-      {!isShadowCatcher &&
+      {isPrincipled && <PrincipledView key={material} material={material} materialLook={materialLook} />}
+      {showsTerms &&
         selectedTerms.value.map((term, index) => (
           <TermCard
             key={index}
@@ -159,14 +190,12 @@ function MaterialInspector() {
             }
           />
         ))}
-      {!isShadowCatcher && materialLook !== undefined && (
+      {showsTerms && materialLook !== undefined && (
         <GlassControls material={material} materialLook={materialLook} original={original} />
       )}
       {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
-      {!isShadowCatcher && <AddTerm material={material} />}
-      {!isShadowCatcher && materialLook !== undefined && (
-        <BasisFunctions material={material} materialLook={materialLook} />
-      )}
+      {showsTerms && <AddTerm material={material} />}
+      {showsTerms && materialLook !== undefined && <BasisFunctions material={material} materialLook={materialLook} />}
       {!isShadowCatcher && materialLook !== undefined && (
         <Section title="Metalness, normals, emission">
           <MetalnessImage material={material} terms={selectedTerms.value} />

@@ -6,6 +6,7 @@ import { listBtfs, listImported, listMaterials, listMeasured, materialThumbnailU
 import { uploadMaterials, uploadMeasured } from "../../session/net/upload";
 import type { BtfBody, ImportedBody, LibraryMaterialBody, MaterialBody, MeasuredBody, Term } from "../../protocol";
 import { MATERIALX_SUFFIX } from "../../start/files/sceneFiles";
+import { withGlassOf } from "../inspector/glass/glass";
 import { look } from "../../state/look";
 import { libraryOpen } from "../../state/panels";
 import { togglePanel } from "../../state/panelWidths";
@@ -234,11 +235,7 @@ export function applyTerms(target: string, label: string, terms: readonly Term[]
 export function applyImported(target: string, { name, terms, normal_map, glass }: LibraryMaterialBody): void {
   const current = look.value?.materials[target];
   if (look.value === null || current === undefined) return;
-  const material = { ...current, terms, normal_map };
-  if (current.glass && glass) {
-    const { color, roughness, ior } = glass;
-    material.glass = { ...current.glass, ...(current.glass.absorption && glass), color, roughness, ior };
-  }
+  const material = withGlassOf({ ...current, terms, normal_map }, glass);
   replaceLook(name, { ...look.value, materials: { ...look.value.materials, [target]: material } });
 }
 

@@ -9,9 +9,17 @@ import { soloMaterial, toggleMaterialSolo } from "../../state/visibility/soloSou
 import { defaultLook, look } from "../../state/look";
 import { materialNames, modelOf } from "../../state/scene";
 import { mayEdit } from "../../state/sessionUser";
-import { hoveredMaterial, selectMaterial, selectedMaterial } from "../../state/selection";
+import {
+  hoveredMaterial,
+  selectMaterial,
+  selectedMaterial,
+  selectedMaterials,
+  selectMaterialsTo,
+  toggleMaterial,
+} from "../../state/selection";
 import { IconButton } from "../../ui/IconButton";
 import { Section } from "../../ui/Section";
+import { copiedMaterial, copyMaterial, pasteMaterial } from "./copyMaterial";
 import { watchBalls, displayedBalls } from "./materialBalls";
 import { BackgroundPanel } from "./BackgroundPanel";
 import { EnvironmentPanel } from "./EnvironmentPanel";
@@ -41,16 +49,55 @@ function MaterialSwatch({ name, material }: { name: string; material: MaterialLo
   );
 }
 
+/** Run a command of the list's keys; false if there is none. */
+function runListKey(event: KeyboardEvent): boolean {
+  if (!event.ctrlKey && !event.metaKey) return false;
+  const focused = (document.activeElement as HTMLElement | null)?.dataset["material"];
+  if (event.key === "c") copyMaterial();
+  else if (event.key === "v" && mayEdit.value) pasteMaterial();
+  else if (event.key === " " && focused !== undefined) toggleMaterial(focused);
+  else return false;
+  return true;
+}
+
+function CopyPaste() {
+  const copied = copiedMaterial.value;
+  const hasSelection = selectedMaterial.value !== null;
+  return (
+    <div class="copy-paste" role="group" aria-label="Copy and paste materials">
+      <button disabled={!hasSelection} title="Copy the selected material (Ctrl+C in the list)" onClick={copyMaterial}>
+        Copy
+      </button>
+      <button
+        disabled={!hasSelection || copied === null || !mayEdit.value}
+        title={
+          copied === null ? "Copy a material first" : `Paste “${copied.name}” on the selection (Ctrl+V in the list)`
+        }
+        onClick={pasteMaterial}
+      >
+        Paste
+      </button>
+    </div>
+  );
+}
+
 function MaterialList() {
   const move = (event: KeyboardEvent) => {
+    if (runListKey(event)) {
+      event.preventDefault();
+      event.stopPropagation();
+      return;
+    }
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (step === undefined) return;
     event.preventDefault();
     event.stopPropagation();
     const items = [...(event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=option]")];
-    items[
-      Math.min(items.length - 1, Math.max(0, items.indexOf(document.activeElement as HTMLElement) + step))
-    ]?.focus();
+    const index = items.indexOf(document.activeElement as HTMLElement) + step;
+    const next = items[Math.min(items.length - 1, Math.max(0, index))];
+    next?.focus();
+    const name = next?.dataset["material"];
+    if (event.shiftKey && name !== undefined) selectMaterialsTo(name, materialNames.value);
   };
   const focusable = selectedMaterial.value ?? materialNames.value[0];
   return (
@@ -58,6 +105,8 @@ function MaterialList() {
       class="materials"
       role="listbox"
       aria-label="Materials"
+      aria-multiselectable="true"
+      title="Ctrl+click or Shift+click selects several"
       onKeyDown={move}
       onPointerLeave={() => (hoveredMaterial.value = null)}
     >
@@ -69,12 +118,17 @@ function MaterialList() {
             key={name}
             role="option"
             tabIndex={name === focusable ? 0 : -1}
-            aria-selected={name === selectedMaterial.value}
+            data-material={name}
+            aria-selected={selectedMaterials.value.includes(name)}
             class={name === hoveredMaterial.value ? "hovered" : ""}
             onPointerEnter={() => (hoveredMaterial.value = name)}
             onFocus={(event) => (hoveredMaterial.value = event.currentTarget.matches(":focus-visible") ? name : null)}
             onBlur={() => (hoveredMaterial.value = null)}
-            onClick={() => selectMaterial(name)}
+            onClick={(event) => {
+              if (event.ctrlKey || event.metaKey) toggleMaterial(name);
+              else if (event.shiftKey) selectMaterialsTo(name, materialNames.value);
+              else selectMaterial(name);
+            }}
           >
             <MaterialSwatch name={name} material={material} />
             <span class="name" title={name}>
@@ -108,6 +162,7 @@ export function ScenePanel() {
     <nav class="panel outline" aria-label="Scene">
       <Section title="Materials" count={materialNames.value.length} actions={<SoloButton />}>
         <MaterialList />
+        <CopyPaste />
       </Section>
       <div inert={!mayEdit.value}>
         <LightsPanel />

@@ -27,6 +27,10 @@ import type {
   ModelBody,
   OcioView,
   Problem,
+  PrincipledBody,
+  PrincipledRequest,
+  PrincipledTermsBody,
+  PrincipledTermsRequest,
   RenderBody,
   RenderPlanBody,
   RenderRequest,
@@ -241,6 +245,16 @@ export async function getAlbedo(terms: Term[]): Promise<AlbedoBody> {
 /** How free-camera views draw each term of a material in the Zernike basis. */
 export async function getZernikeFit(body: ZernikeFitRequest): Promise<ZernikeFitBody[]> {
   return (await (await request("/api/models/zernike-fit", json("POST", body))).json()) as ZernikeFitBody[];
+}
+
+/** Principled parameters of a material, or those of the closest principled one. */
+export async function readPrincipled(body: PrincipledRequest): Promise<PrincipledBody> {
+  return (await (await request("/api/models/principled", json("POST", body))).json()) as PrincipledBody;
+}
+
+/** Terms and glass of principled parameters. */
+export async function makePrincipledTerms(body: PrincipledTermsRequest): Promise<PrincipledTermsBody> {
+  return (await (await request("/api/models/principled/terms", json("POST", body))).json()) as PrincipledTermsBody;
 }
 
 export async function startRender(body: RenderRequest): Promise<RenderBody> {

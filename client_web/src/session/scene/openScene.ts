@@ -14,7 +14,7 @@ import { connection, freezeStatus } from "../../state/connection";
 import { fidelity, isOutdated } from "../../state/fidelity";
 import { defaultLook, look } from "../../state/look";
 import { models, page, scene, unbakedAspect } from "../../state/scene";
-import { selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../../state/selection";
+import { alsoSelected, selectedCurve, selectedLight, selectedMaterial, selectedTerm } from "../../state/selection";
 import { joinState, members, selfNumber, type JoinState } from "../../state/collaboration";
 import { availableViews, hoveredView, shownViews, activeViewName } from "../../state/views";
 import { reportErrors } from "../../ui/toasts";
@@ -38,6 +38,7 @@ function resetEditor(newScene: SceneBody): void {
   bake.value = pendingBake.value = method.value = null;
   axes.value = [];
   selectedMaterial.value = selectedCurve.value = null;
+  alsoSelected.value = [];
   selectedLight.value = soloMaterial.value = soloLight.value = pathOverride.value = null;
   singleTransforms.value = gridTransforms.value = new Map();
   hoveredView.value = null;

@@ -21,6 +21,14 @@ function inRange(term: Term, name: string, value: number): number {
   return parameter === undefined ? value : Math.min(parameter.maximum, Math.max(parameter.minimum, value));
 }
 
+/** The material with the glass of another one, if it is glass in the scene; only solids absorb. */
+export function withGlassOf(material: MaterialLook, glass: MaterialLook["glass"]): MaterialLook {
+  if (!material.glass || !glass) return material;
+  const { color, roughness, ior } = glass;
+  const absorbing = material.glass.absorption ? glass : {};
+  return { ...material, glass: { ...material.glass, ...absorbing, color, roughness, ior } };
+}
+
 /** The material with edited glass. Terms that reflect as the glass before reflect as the glass after: their f0 follows
  * the index of refraction, and their roughness that of the glass. */
 export function withGlass(material: MaterialLook, change: Partial<GlassLook>): MaterialLook {
