@@ -148,14 +148,6 @@ export interface FocusMessage {
   view: string;
 }
 
-/** Light through a surface of glass; its material's terms are what it reflects. `color`: transmittance of one passage, without reflection. `absorption`: coefficients inside a solid, per meter; not of thin glass. `roughness`: as the transmitted light shows it, the square root of the width of GGX facets. `ior`: index of refraction. */
-export interface GlassLook {
-  color: [number, number, number];
-  absorption?: [number, number, number];
-  roughness: number;
-  ior: number;
-}
-
 /** client → server: show the pixels that a curve's interval affects; each visible view answers "highlight". */
 export interface HighlightMessage {
   type: "highlight_curve_range";
@@ -238,7 +230,7 @@ export interface PresenceMessage {
 /** Terms and glass of a material's look. `scene` and `material` name the material of a scene whose textures the terms use; without them, its textures count as white. */
 export interface PrincipledRequest {
   terms: Record<string, unknown>[];
-  glass?: GlassLook | null;
+  glass?: Record<string, unknown> | null;
   scene?: string | null;
   material?: string | null;
 }
@@ -247,7 +239,7 @@ export interface PrincipledRequest {
 export interface PrincipledTermsRequest {
   terms: Record<string, unknown>[];
   parameters: Record<string, unknown>;
-  glass?: GlassLook | null;
+  glass?: Record<string, unknown> | null;
   texture_means?: TextureMeansBody | null;
 }
 
@@ -958,7 +950,7 @@ export interface PrincipledBody {
   texture_means: TextureMeansBody;
 }
 
-/** Principled parameters, see docs/guide: colors are linear Rec. 709, roughness is perceptual. */
+/** Principled parameters, as in docs/api.md: colors are linear Rec. 709, roughness is perceptual. */
 export interface PrincipledParameters {
   base_color: [number, number, number];
   metallic: number;
