@@ -506,6 +506,9 @@ class PointLook(TypedDict):
     shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["point"]]
     position: NotRequired[Sequence[float]]
+    direction: NotRequired[Sequence[float]]
+    rotation: NotRequired[float]
+    profile: NotRequired[str | None]
 
 
 class PointsLook(TypedDict):
@@ -766,6 +769,9 @@ class SpotLook(TypedDict):
     position: NotRequired[Sequence[float]]
     direction: NotRequired[Sequence[float]]
     cone: NotRequired[Sequence[float]]
+    rotation: NotRequired[float]
+    profile: NotRequired[str | None]
+    gobo: NotRequired[str | None]
 
 
 class StatusMessage(TypedDict):

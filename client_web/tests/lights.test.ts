@@ -211,7 +211,7 @@ describe("the inspector's fields", () => {
 
 test("a saved look may say only what it changes of a light", () => {
   expect(completeLight({ intensity: 2 }, spot)).toEqual({ ...spot, intensity: 2 });
-  expect(completeLight({ kind: "point" }, spot)).toEqual({ kind: "point", ...common, position: [0, 1, 0] });
+  expect(completeLight({ kind: "point" }, spot)).toEqual(DEFAULT_LIGHTS.point);
 });
 
 describe("one light alone", () => {

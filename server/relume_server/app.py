@@ -35,7 +35,7 @@ from relume_server.api import (
     solve,
     viewport,
 )
-from relume_server.api.assets import balls, btf_jobs, btfs, environments, images, imported, library, materials
+from relume_server.api.assets import balls, btf_jobs, btfs, environments, ies, images, imported, library, materials
 from relume_server.api.pagination import check_query
 from relume_server.auth.middleware import AuthMiddleware
 from relume_server.auth.rules import methods_at
@@ -75,6 +75,7 @@ ROUTE_GROUPS = (
     library,
     balls,
     environments,
+    ies,
     images,
     bakes,
     probes,

@@ -71,6 +71,8 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/environments": {"GET": VIEW, "POST": EDIT},
     "/api/environments/{environment}": {"GET": VIEW, "DELETE": EDIT},
     "/api/environments/{environment}/thumbnail.png": {"GET": VIEW},
+    "/api/ies": {"GET": VIEW, "POST": EDIT},
+    "/api/ies/{ies}": {"GET": VIEW, "DELETE": EDIT},
     "/api/images": {"GET": VIEW, "POST": EDIT},
     "/api/images/{image}": {"GET": VIEW, "DELETE": EDIT},
     "/api/images/{image}/metalness": {"POST": EDIT},

@@ -31,7 +31,7 @@ SUMMARY = "summary.json"
 """File with the summary of a scene, next to its folder."""
 IMAGES = "images"
 """Folder with the images of imported materials, next to the material's."""
-ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "imported", "tile"]
+ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "ies", "material", "imported", "tile"]
 
 
 @dataclass(frozen=True)
@@ -149,6 +149,8 @@ def _import(request: ImportRequest) -> str:
         return _put_on_ground(request)
     if request.kind == "image":
         return _import_image(request)
+    if request.kind == "ies":
+        return _import_ies(request)
     if request.kind == "material":
         return _import_material(request)
     if request.kind == "imported":
@@ -168,6 +170,12 @@ def _import_image(request: ImportRequest) -> str:
     from relume.images.image_store import store
 
     return store(Path(request.into), Path(request.file), request.name).id
+
+
+def _import_ies(request: ImportRequest) -> str:
+    from relume.assets.ies.ies_store import store_ies
+
+    return store_ies(Path(request.into), Path(request.file), request.name).id
 
 
 def _import_material(request: ImportRequest) -> str:

@@ -9,10 +9,11 @@ from pathlib import Path
 from relume.assets.asset_store import AssetStore
 from relume.assets.btf.btf_store import STORE as BTFS
 from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
+from relume.assets.ies.ies_store import IES_FILES
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
 from relume.imported_materials.material_store import STORE as IMPORTED
-from relume_worker.paths import btfs_path, environments_path, images_path, imported_materials_path, materials_path
+from relume_worker.paths import btfs_path, environments_path, ies_path, images_path, imported_materials_path, materials_path
 
 
 def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
@@ -23,6 +24,7 @@ def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
         (BTFS, btfs_path(data_dir)),
         (ENVIRONMENTS, environments_path(data_dir)),
         (IMAGES, images_path(data_dir)),
+        (IES_FILES, ies_path(data_dir)),
     ]
 
 

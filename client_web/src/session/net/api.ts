@@ -9,6 +9,7 @@ import type {
   CommentRequest,
   DryRunBody,
   EnvironmentBody,
+  IesBody,
   ImageBody,
   ZernikeFitBody,
   ZernikeFitRequest,
@@ -163,6 +164,10 @@ export const getColor = () => getJson<ColorBody>("/api/color");
 export async function getLut(config: string, { display, view }: OcioView): Promise<ArrayBuffer> {
   const query = new URLSearchParams({ display, view });
   return (await request(`/api/color/${encodeURIComponent(config)}/lut?${query}`)).arrayBuffer();
+}
+export const listIes = () => getJson<IesBody[]>("/api/ies");
+export async function deleteIes(id: string): Promise<void> {
+  await request(`/api/ies/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 export const listImages = () => getJson<ImageBody[]>("/api/images");
 export async function deleteImage(id: string): Promise<void> {
