@@ -62,7 +62,7 @@ def directions(count):
 def intensity(geometry, away, table):
     """Intensity of a light of unit emission in unit directions, from the irradiance of points that face it."""
     light = prepare_local_lights(geometry, intensity_table=table)
-    points = np.array(POSITION) + 1.5 * away
+    points = np.array(geometry.position) + 1.5 * away
     receivers = make_surface_points(points.astype(np.float32), -away.astype(np.float32))
     visible = np.full((len(points), 1), 255, np.uint8)
     return 1.5**2 * compute_irradiance(light, make_light_strata(light, 64), receivers, visible)
@@ -109,6 +109,23 @@ def test_edges_of_a_gobo_lie_where_perspective_projects_them(assets):
     expected = (np.floor(8 * u) + np.floor(8 * v)) % 2 / gobo.mean[0]
     np.testing.assert_allclose(actual[inside], expected[inside], atol=0.02 / gobo.mean[0])
     assert gobo.mean[0] == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_gobo_is_upright_and_unmirrored_along_the_light(assets):
+    """The red quarter is at the upper left, the blue part at the lower right; looking down with +Z up, left is +X."""
+    gobo = project_gobo(load_gobo(assets["colored"]), 45.0)
+    assert gobo.is_colored
+    away = np.array([[x, -2.0, z] for z in (0.5, -0.5) for x in (0.6, -0.6)]) / np.sqrt(4.61)
+    geometry = LightGeometry("spot", (0.0, 2.0, 0.0), (0.0, -1.0, 0.0), (44.9, 45.0), gobo=assets["colored"])
+    red, blue = (
+        intensity(geometry, away, intensity_table(45.0, None, gobo.relative_intensity(k))) * gobo.mean[k]
+        for k in (0, 2)
+    )
+    np.testing.assert_allclose(red[[0, 3]], [1, 0], atol=0.02)
+    np.testing.assert_allclose(blue[[0, 3]], [0, 1], atol=0.02)
+    turned = geometry._replace(rotation=180.0)
+    table = intensity_table(45.0, None, gobo.relative_intensity(2))
+    np.testing.assert_allclose(intensity(turned, away, table)[[0, 3]] * gobo.mean[2], [1, 0], atol=0.02)
 
 
 def test_a_plain_light_has_no_table_and_equal_bits(assets):
@@ -182,7 +199,7 @@ def test_a_black_gobo_is_dark(bake, assets):
         ({"kind": "point", "profile": "ies:0000000000000000"}, "/lights/A/profile"),
         ({"kind": "point", "profile": 3}, "/lights/A/profile"),
         ({"kind": "point", "profile": "../ies"}, "/lights/A/profile"),
-        ({"kind": "point", "gobo": "checker"}, "/lights/A"),
+        ({"kind": "point", "gobo": "checker"}, "/lights/A/gobo"),
         ({"kind": "spot", "gobo": "image:0000000000000000"}, "/lights/A/gobo"),
         ({"kind": "spot", "gobo": "skew"}, "/lights/A/gobo"),
         ({"kind": "spot", "gobo": "checker", "cone": [20, 89]}, "/lights/A/cone/1"),

@@ -27,7 +27,18 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 OwnedKind = Literal[
-    "upload", "scene", "environment", "material", "btf-job", "btf", "image", "ies", "imported", "bake", "render", "comparison"
+    "upload",
+    "scene",
+    "environment",
+    "material",
+    "btf-job",
+    "btf",
+    "image",
+    "ies",
+    "imported",
+    "bake",
+    "render",
+    "comparison",
 ]
 MAX_STREAMS_EACH = 32
 """Maximum number of event streams per caller."""

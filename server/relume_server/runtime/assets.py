@@ -13,7 +13,14 @@ from relume.assets.ies.ies_store import IES_FILES
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
 from relume.imported_materials.material_store import STORE as IMPORTED
-from relume_worker.paths import btfs_path, environments_path, ies_path, images_path, imported_materials_path, materials_path
+from relume_worker.paths import (
+    btfs_path,
+    environments_path,
+    ies_path,
+    images_path,
+    imported_materials_path,
+    materials_path,
+)
 
 
 def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
