@@ -5,8 +5,9 @@ The Cornell box, 128×128 pixels, diffuse; the environment is black. Images are 
 pixels, with Mitsuba's noise removed: a pixel has one view sample inside surfaces and many in Mitsuba, which differ
 along the edges of hard shadows. Mitsuba's spot falls off in angle and ours in cosine: the compared cone has an edge of
 a tenth of a degree. Mitsuba has no links: for the linked light, surfaces that are not linked are black there and still
-cast shadows, which is the same direct light. Its sun is a disk 1 km away. For the installation of Mitsuba see
-bench/relume_bench/mitsuba.py.
+cast shadows, which is the same direct light. Its sun is a disk 1 km away. An IES file and a gobo are textures of its
+spot (`relume_bench.light_assets`); because of the gobo's edges, ours is the mean of 4×4 pixels. For the installation
+of Mitsuba see bench/relume_bench/mitsuba.py.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure, skipped
 from relume_bench.indirect import PASSES
-from relume_bench.mitsuba import bsdf, missing, read_passes, render
+from relume_bench.light_assets import light_assets, mitsuba_texture
+from relume_bench.mitsuba import averaged, bsdf, missing, read_passes, render
 from relume_bench.standard_error import compare_with_passes
 
 F64 = NDArray[np.float64]
@@ -67,8 +69,17 @@ _LIGHTS: dict[str, dict[str, Any]] = {
         "emission": [40.0, 36.0, 30.0],
     },
     "sun": {"kind": "directional", "direction": [-0.4, -1.0, -0.5], "angle": 5.0, "emission": [2.0, 2.0, 2.0]},
+    "ies": {
+        "kind": "spot", "position": [0.0, 1.9, 0.9], "direction": [0.0, -1.0, -0.5], "cone": [59.9, 60.0],
+        "rotation": 30.0, "emission": [6.0, 6.0, 6.0], "profile": "ies",
+    },
+    "gobo": {
+        "kind": "spot", "position": [0.0, 1.9, 0.9], "direction": [0.0, -1.0, -0.5], "cone": [49.9, 50.0],
+        "rotation": 30.0, "emission": [6.0, 6.0, 6.0], "gobo": "gobo",
+    },
 }  # fmt: skip
 _BLOCK = 4
+_GOBO_FINER = 4  # pixels of ours per side of one of Mitsuba's: many are at edges of fields
 _SUN_DISTANCE = 1000.0  # meters, of Mitsuba's sun disk
 _NAMES = tuple(f"lights.rmse_{kind}" for kind in _LIGHTS)
 _FPS = "lights.intensity_fps"
@@ -87,22 +98,34 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
     room = cornell_box()
     night = Environment("night", np.full((4, 8, 3), 1e-7, np.float32))
     scene = make_scene("night", room.meshes, room.materials, room.cameras, night)
-    recipe = Recipe("direct", ("front",), size, 20)
-    transfer = open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Cache(4 << 30))
+    transfers = {finer: _bake(scene, size, finer, folder) for finer in (1, _GOBO_FINER)}
     figures = []
     for name, (kind, light) in zip(_NAMES, _LIGHTS.items(), strict=True):
-        rendered = render_image(transfer, "front", _make_look(transfer, {"A": light})).astype(np.float64)
+        finer = _GOBO_FINER if kind == "gobo" else 1
+        transfer = transfers[finer]
+        with light_assets(folder) as names:
+            named = light | {field: names[light[field]] for field in ("profile", "gobo") if field in light}
+            look = _make_look(transfer, {"A": named})
+            rendered = averaged(render_image(transfer, "front", look), finer)
         bsdfs = [bsdf(_lit_terms(scene, mesh, light)) for mesh in scene.meshes]
-        job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [_emitter(light, transfer)]}
+        emitter = _emitter(light, look.lights["A"].geometry, mitsuba_texture(folder, light))
+        job = {"spp": [spp], "passes": PASSES, "bsdfs": bsdfs, "emitters": [emitter]}
         render(scene, size, job, folder)
         reference_passes = read_passes(folder)
         comparison = compare_with_passes(
             _average_blocks(rendered),
             np.array([_average_blocks(block_pass) for block_pass in reference_passes], np.float32),
         )
-        context = {**comparison.context, "size": list(size), "spp": PASSES * spp, "kind": kind}
+        context = {**comparison.context, "size": list(size), "spp": PASSES * spp, "kind": kind, "finer": finer}
         figures.append(Figure(name, comparison.error.value, "relative RMSE", context, comparison.error.standard_error))
     return figures
+
+
+def _bake(scene: Scene, size: tuple[int, int], finer: int, folder: Path) -> FixedViewTransfer:
+    """Bake the view with `finer` times as many pixels per side."""
+    recipe = Recipe("direct", ("front",), (finer * size[0], finer * size[1]), 20)
+    store = bake_in_process(METHODS["direct"], scene, recipe, folder / f"direct_{finer}.zarr")
+    return open_transfer(store, Cache(4 << 30))
 
 
 def _lit_terms(scene: Scene, mesh: Mesh, light: dict[str, Any]) -> Sequence[dict[str, Any]]:
@@ -122,9 +145,8 @@ def _average_blocks(picture: NDArray[np.floating]) -> F64:
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
 
 
-def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, Any]:
-    """A light of a look as Mitsuba's description; `to_world` row by row."""
-    geometry = _make_look(transfer, {"A": light}).lights["A"].geometry
+def _emitter(light: dict[str, Any], geometry: LightGeometry, texture: dict[str, Any]) -> dict[str, Any]:
+    """A light of a look as Mitsuba's description; `to_world` row by row. texture: of a spot, or empty"""
     emission = {"type": "rgb", "value": light["emission"]}
     if light["kind"] == "point":
         return {"type": "point", "position": light["position"], "intensity": emission}
@@ -134,11 +156,11 @@ def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, An
     if light["kind"] == "directional":
         return {"type": "directional", "direction": light["direction"], "irradiance": emission}
     to_world = np.eye(4)
-    to_world[:3, :3] = light_axes(geometry.direction).T
+    to_world[:3, :3] = light_axes(geometry.direction, geometry.rotation).T * (-1, -1, 1)  # Mitsuba's u runs along X
     to_world[:3, 3] = geometry.position
     inner, outer = geometry.cone
     angles = {"beam_width": inner, "cutoff_angle": outer}
-    return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles}
+    return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles, **texture}
 
 
 def _mitsuba_shape(geometry: LightGeometry) -> dict[str, Any] | None:

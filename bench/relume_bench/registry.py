@@ -305,6 +305,8 @@ GROUPS = (
             "lights.rmse_sphere",
             "lights.rmse_tube",
             "lights.rmse_sun",
+            "lights.rmse_ies",
+            "lights.rmse_gobo",
             "lights.intensity_fps",
         ),
     ),

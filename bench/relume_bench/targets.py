@@ -139,6 +139,8 @@ TARGETS = {
     "lights.rmse_sphere": "≤ 2 %",
     "lights.rmse_tube": "≤ 2 %",
     "lights.rmse_sun": "≤ 2 %",
+    "lights.rmse_ies": "≤ 2 %",
+    "lights.rmse_gobo": "≤ 2 %",
     "lights.intensity_fps": "≥ 60",
     "solve.error": "≤ 1 %",
     "solve.error_noisy": "≤ 3 %",

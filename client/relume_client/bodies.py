@@ -535,6 +535,9 @@ class PointLook(TypedDict):
     shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
     kind: NotRequired[Literal["point"]]
     position: NotRequired[Sequence[float]]
+    direction: NotRequired[Sequence[float]]
+    rotation: NotRequired[float]
+    profile: NotRequired[str | None]
 
 
 class PointsLook(TypedDict):
@@ -844,6 +847,9 @@ class SpotLook(TypedDict):
     position: NotRequired[Sequence[float]]
     direction: NotRequired[Sequence[float]]
     cone: NotRequired[Sequence[float]]
+    rotation: NotRequired[float]
+    profile: NotRequired[str | None]
+    gobo: NotRequired[str | None]
 
 
 class StatusMessage(TypedDict):

@@ -146,7 +146,7 @@ export interface PanelsLook {
   source: string;
 }
 
-/** A point light that emits equally in all directions; emission is radiant intensity, W/sr. */
+/** A point light that emits equally in all directions; emission is radiant intensity, W/sr. `profile`: an uploaded IES file, "ies:<id>", by which it emits: intensity is emission times the file's over its maximum. `direction`: its nadir. `rotation`: of its C0 plane about that, degrees. None: equally in all directions. */
 export interface PointLook {
   intensity: number;
   color: [number, number, number];
@@ -156,6 +156,9 @@ export interface PointLook {
   shadow_link?: IncludeLink | ExcludeLink | null;
   kind: "point";
   position: [number, number, number];
+  direction?: [number, number, number];
+  rotation?: number;
+  profile?: string | null;
 }
 
 /** Many point and spot lights of the scene as one source, its `source`; emission is their mean intensity, W/sr. */
@@ -198,7 +201,7 @@ export interface SphereLook {
   radius: number;
 }
 
-/** A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr. */
+/** A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr. `gobo`: an uploaded image, "image:<id>", in the square about the cone; its linear RGB multiplies the intensity. `profile`: as of a point light. `rotation`: of both about the direction, degrees. */
 export interface SpotLook {
   intensity: number;
   color: [number, number, number];
@@ -210,6 +213,9 @@ export interface SpotLook {
   position: [number, number, number];
   direction: [number, number, number];
   cone: [number, number];
+  rotation?: number;
+  profile?: string | null;
+  gobo?: string | null;
 }
 
 /** Surfaces by name: all of some materials, and all of some objects. Objects are the meshes of the scene. */
@@ -266,8 +272,8 @@ type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { ki
 
 /** A light of each kind, complete. */
 export const DEFAULT_LIGHTS: LightsByKind = {
-  point: { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0] },
-  spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
+  point: { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, profile: null },
+  spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30], rotation: 0, profile: null, gobo: null },
   directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, direction: [0, -1, 0], angle: 0 },
   rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
   disc: { kind: "disc", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, position: [0, 1, 0], direction: [0, -1, 0], radius: 0.25 },

@@ -700,6 +700,18 @@ export interface HelloMessage {
   free_camera_error: FreeCameraError | null;
 }
 
+/** An IES file that point and spot lights of looks can use as `profile`. `candela`: its maximum intensity. `emission`: of a light with that intensity, W/sr. `warnings`: simplifications when it was read. `planes`: intensity over the maximum in the planes C0, C90, C180 and C270, every 5° from the nadir. */
+export interface IesBody {
+  id: string;
+  profile: string;
+  name: string;
+  created: string;
+  candela: number;
+  emission: number;
+  warnings: string[];
+  planes: number[][];
+}
+
 /** An image that looks can use instead of a material's own: as `texture` or `roughness_map` of its terms, or as its `normal_map`. `size`: width and height. `warnings`: changes made when its file was read. `roughness`: mean of its green channel, the roughness of a material that uses it as a map. For images made from a metallic map: `metalness` is the id of that map; `base` is its base color: an image, "diffuse" or "scene" for the scene's own textures, or null if it is constant. */
 export interface ImageBody {
   id: string;

@@ -20,6 +20,7 @@ export type {
   ExportedMaterial,
   ExportReportBody,
   ExportRequest,
+  IesBody,
   ImageBody,
   ImportOptions,
   ViewportBody,

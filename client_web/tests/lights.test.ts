@@ -1,4 +1,5 @@
 import { describe, expect, test } from "vitest";
+import { DEFAULT_LIGHTS } from "../src/look.gen";
 import { stepLabel } from "../src/edit/stepLabel";
 import { projectionCameraOf, project, pushPoint, slidePoint } from "../src/panels/lights/lightProjection";
 import { angleFieldsOf, numbersFieldsOf } from "../src/panels/lights/lightFields";
@@ -171,7 +172,8 @@ describe("a new light", () => {
   });
 
   test("keeps as another kind what both have", () => {
-    expect(changeKind(spot, "point")).toEqual({ kind: "point", ...common, position: [0, 2, 0] });
+    const direction: Triple = [0, -2, 0];
+    expect(changeKind(spot, "point")).toEqual({ ...DEFAULT_LIGHTS.point, ...common, position: [0, 2, 0], direction });
     expect(changeKind(sun, "spot")).toMatchObject({ direction: [0, -1, 0], cone: [20, 30], position: [0, 1, 0] });
   });
 });
@@ -211,7 +213,7 @@ describe("the inspector's fields", () => {
 
 test("a saved look may say only what it changes of a light", () => {
   expect(completeLight({ intensity: 2 }, spot)).toEqual({ ...spot, intensity: 2 });
-  expect(completeLight({ kind: "point" }, spot)).toEqual({ kind: "point", ...common, position: [0, 1, 0] });
+  expect(completeLight({ kind: "point" }, spot)).toEqual(DEFAULT_LIGHTS.point);
 });
 
 describe("one light alone", () => {

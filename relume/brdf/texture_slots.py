@@ -33,10 +33,10 @@ class NormalMap(NamedTuple):
 
 
 class EmissionImage(NamedTuple):
-    """An image that surfaces emit, relative to their mean emission.
+    """An image that surfaces emit, or the gobo of a spot, relative to the mean emission.
 
     Attributes:
-        image: "image:<id>" of an uploaded image. mean: its mean over the surfaces, linear RGB.
+        image: "image:<id>" of an uploaded image. mean: its mean over the surfaces or the cone, linear RGB.
         is_colored: its color varies over them.
     """
 

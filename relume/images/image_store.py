@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -228,6 +228,11 @@ def load_emission_image(emission: EmissionImage) -> Texture:
     return _load_emission(IMAGES.resolve(emission.image), emission.mean)
 
 
+def load_gobo(name: str) -> Texture:
+    """Load the image of a spot's `gobo`; its edges do not repeat. Raises what `load_texture` raises."""
+    return _load_gobo(IMAGES.resolve(name))
+
+
 def mean_roughness(name: str) -> float:
     """Mean of a roughness map. Raises what `load_texture` raises."""
     return _load_mean(IMAGES.resolve(name))
@@ -246,6 +251,11 @@ def _load_emission(path: Path, mean: tuple[float, float, float]) -> Texture:
         return Texture((texture.pixels * inverse_mean).astype(np.float32), texture.wrap)
     red, green, blue = (inverse_mean * texture.encoding.scale).tolist()
     return Texture(texture.pixels, texture.wrap, TextureEncoding("srgb", (red, green, blue)))
+
+
+@asset_cached("gobo image")
+def _load_gobo(path: Path) -> Texture:
+    return replace(_load(path), wrap=("clamp", "clamp"))
 
 
 @asset_cached("roughness map image")

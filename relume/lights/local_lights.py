@@ -5,6 +5,7 @@
     point        w = 1 / d²                                        emission W/sr
     spot         w = s² / d²,  s = clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)   (KHR_lights_punctual)
     directional  w = 1                                             emission W/m²
+    with a web or a gobo, point and spot times J(θ, φ), a table (`relume.raytrace.intensity_table`)
     points       w = M pm · w of light m, pm = Im / Σ I            emission W/sr, the mean of its M lights
                  w = M / N · w of light m with more lights than samples, N of them at random by pm
     surface      w = A cos θl / (N d²),  N uniform samples         emission W/m²/sr
@@ -49,7 +50,8 @@ _SEED = 1
 # most samples of a mesh, and of many lights, face away from a point, or are far from it; half of those of a sphere and
 # a tube face away
 _SAMPLE_FACTORS = {"rectangle": 1, "disc": 1, "sphere": 4, "tube": 4, "mesh": 4, "panels": 4, "points": 4}
-_PI = np.float32(math.pi)
+_PI, _TWO_PI = np.float32(math.pi), np.float32(2 * math.pi)
+UNIFORM_INTENSITY = np.ones((1, 1), np.float32)
 _MIN_CONE_COSINES = 1e-3  # difference of cosines, as in KHR_lights_punctual
 
 
@@ -61,6 +63,8 @@ class LocalLight(NamedTuple):
         position: positions of point lights, meters. axis: unit axes of spots; direction of travel of directional light.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
         intensity_cdf: cumulative intensity of the point lights.
+        intensity_table: J at equidistant θ and φ of the only point light; one value for M of them, or without J.
+        table_axes: horizontal and upright axis that φ is measured from. table_scale: cells per radian of θ and φ.
         corner, edges, normal: corner, edges and normals of parallelograms or triangles; unit normals.
         end_offset: of ray ends from the pieces, see `relume.math.plane_rounding.end_offsets`.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
@@ -74,6 +78,9 @@ class LocalLight(NamedTuple):
     cone_scale: Shaped[F32, " M"]
     cone_offset: Shaped[F32, " M"]
     intensity_cdf: Shaped[F32, " M"]
+    intensity_table: Shaped[F32, "polar azimuth"]
+    table_axes: Shaped[F32, "2 3"]
+    table_scale: Shaped[F32, " 2"]
     corner: Shaped[F32, "T 3"]
     edges: Shaped[F32, "T 2 3"]
     normal: Shaped[F32, "T 3"]
@@ -130,7 +137,10 @@ def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
 
 
 def prepare_local_lights(
-    geometry: LightGeometry, triangles: LightTriangles | None = None, points: LightPoints | None = None
+    geometry: LightGeometry,
+    triangles: LightTriangles | None = None,
+    points: LightPoints | None = None,
+    intensity_table: Shaped[F32, "polar azimuth"] = UNIFORM_INTENSITY,
 ) -> LocalLight:
     """Prepare a light of a look.
 
@@ -139,6 +149,7 @@ def prepare_local_lights(
         triangles: of a light of kind "mesh" or "panels", which without area emits nothing; or of a sun disk, from
             `sun_triangles`.
         points: the lights of kind "points".
+        intensity_table: of a point or a spot, from `relume.raytrace.intensity_table`.
     """
     is_rectangle = geometry.kind == "rectangle"
     triangles = shape_triangles(geometry) if triangles is None else triangles
@@ -154,6 +165,7 @@ def prepare_local_lights(
     return LocalLight(
         kind=SURFACE if len(pieces) else _KINDS.get(geometry.kind, SURFACE),
         **_point_fields(_single_point(geometry) if points is None else points),
+        **_table_fields(geometry, intensity_table),
         corner=corner[pieces].astype(np.float32),
         edges=edges[pieces].astype(np.float32),
         normal=piece_normals.astype(np.float32),
@@ -164,6 +176,23 @@ def prepare_local_lights(
         is_two_sided=triangles is not None and triangles.is_two_sided,
         sample_factor=_sample_factor(geometry),
     )
+
+
+def outer_angle(geometry: LightGeometry) -> float:
+    """Return the half-angle of the cone of a point or a spot, degrees."""
+    return geometry.cone[1] if geometry.kind == "spot" else 180.0
+
+
+def _table_fields(geometry: LightGeometry, table: Shaped[F32, "polar azimuth"]) -> dict[str, F32]:
+    """Fields of `LocalLight` for a table; its only azimuth is repeated, so that kernels interpolate."""
+    if table.shape[1] == 1 < len(table):
+        table = np.repeat(table, 2, axis=1)
+    cells_per_radian = (np.array(table.shape) - 1) / np.radians([outer_angle(geometry), 360.0])
+    return {
+        "intensity_table": table,
+        "table_axes": light_axes(geometry.direction, geometry.rotation)[:2].astype(np.float32),
+        "table_scale": cells_per_radian.astype(np.float32),
+    }
 
 
 def _single_point(geometry: LightGeometry) -> LightPoints:
@@ -189,8 +218,8 @@ def _point_fields(points: LightPoints) -> dict[str, F32]:
 
 
 def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
-    """Reduce a light to the geometry of its shadows: a spot casts those of a point light."""
-    if geometry.kind != "spot":
+    """Reduce a light to the geometry of its shadows: a point casts the same in all directions, and a spot its own."""
+    if geometry.kind not in ("point", "spot"):
         return geometry
     return LightGeometry("point", geometry.position, link=geometry.link, shadow_link=geometry.shadow_link)
 
@@ -228,6 +257,26 @@ def _cones(cone: Shaped[F64, "M 2"]) -> tuple[F64, F64]:
     return scale, np.where(cone[:, 1] > 90, 1, -cos_outer * scale)
 
 
+@nb.njit(nogil=True, cache=True, inline="always")
+def _table_lookup(table, axes, scale, along, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Interpolate J(θ, φ) bilinearly.
+
+    Args:
+        table, axes, scale: see `LocalLight`. along: cos θ. dx, dy, dz: unit direction toward the light.
+    """
+    unity = np.float32(1)
+    x = -(dx * axes[0, 0] + dy * axes[0, 1] + dz * axes[0, 2])
+    y = -(dx * axes[1, 0] + dy * axes[1, 1] + dz * axes[1, 2])
+    polar = scale[0] * np.float32(math.atan2(math.sqrt(x * x + y * y), along))
+    azimuth = np.float32(math.atan2(y, x))
+    azimuth = scale[1] * (azimuth if azimuth >= 0 else azimuth + _TWO_PI)
+    row, column = min(int(polar), table.shape[0] - 2), min(int(azimuth), table.shape[1] - 2)
+    s, t = min(polar - np.float32(row), unity), min(azimuth - np.float32(column), unity)
+    low = table[row, column] + t * (table[row, column + 1] - table[row, column])
+    high = table[row + 1, column] + t * (table[row + 1, column + 1] - table[row + 1, column])
+    return low + s * (high - low)
+
+
 # inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
 @nb.njit(nogil=True, cache=True, inline="always")
 def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
@@ -260,7 +309,10 @@ def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: 
         dx, dy, dz = dx * inverse_distance, dy * inverse_distance, dz * inverse_distance
         along = -(dx * light.axis[point, 0] + dy * light.axis[point, 1] + dz * light.axis[point, 2])
         falloff = min(max(light.cone_scale[point] * along + light.cone_offset[point], zero), unity)
-        return dx, dy, dz, distance, scale * falloff * falloff / (distance * distance), zero, zero, zero, zero
+        weight = scale * falloff * falloff / (distance * distance)
+        if light.intensity_table.shape[0] > 1:
+            weight *= _table_lookup(light.intensity_table, light.table_axes, light.table_scale, along, dx, dy, dz)
+        return dx, dy, dz, distance, weight, zero, zero, zero, zero
     if light.area == 0:
         return unity, zero, zero, unity, zero, zero, zero, zero, zero
     u, v = strata.uv[sample, 0] + shift_u, strata.uv[sample, 1] + shift_v

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+from relume.assets.ies.ies_store import check_profile
 from relume.brdf.texture_slots import check_image
 from relume.core.errors import Description
 from relume.core.validation import (
@@ -22,6 +23,7 @@ from relume.scene.model import Light
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS, MAX_SUN_ANGLE, RADIUS_RANGE
 
 MAX_INTENSITY = 1e4
+MAX_GOBO_CONE = 85.0  # degrees: at 90 its image would be infinite
 MIN_DIRECTION = 1e-6  # smallest allowed longest component
 LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; meters, degrees
     "intensity": (0.0, MAX_INTENSITY),
@@ -49,8 +51,15 @@ _COMMON_DEFAULTS: dict[str, Any] = {
 _POSITION = {"position": [0.0, 1.0, 0.0]}
 _DIRECTION = {"direction": [0.0, -1.0, 0.0]}
 _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
-    "point": _POSITION,
-    "spot": {**_POSITION, **_DIRECTION, "cone": [20.0, 30.0]},
+    "point": {**_POSITION, **_DIRECTION, "rotation": 0.0, "profile": None},
+    "spot": {
+        **_POSITION,
+        **_DIRECTION,
+        "cone": [20.0, 30.0],
+        "rotation": 0.0,
+        "profile": None,
+        "gobo": None,
+    },
     "directional": {**_DIRECTION, "angle": 0.0},
     "rectangle": {**_POSITION, **_DIRECTION, "rotation": 0.0, "size": [0.5, 0.5]},
     "disc": {**_POSITION, **_DIRECTION, "radius": 0.25},
@@ -158,6 +167,8 @@ def _merge(pointer: Pointer, partial: Mapping[str, Any], base: Mapping[str, Any]
     fields = {**base, **partial}
     for field, value in fields.items():
         _check_field((*pointer, field), field, value, base)
+    if fields.get("gobo") is not None and fields["cone"][1] > MAX_GOBO_CONE:
+        raise invalid_value((*pointer, "cone", 1), fields["cone"][1], f"at most {MAX_GOBO_CONE:g} with a gobo")
     return fields
 
 
@@ -188,7 +199,9 @@ def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, An
         case "source":
             if base["source"] not in ("", value):
                 raise invalid_value(pointer, value, f"{base['source']!r}: the scene decides which lights it has")
-        case "image":
+        case "profile":
+            check_profile(pointer, value)
+        case "image" | "gobo":
             if value is not None:
                 check_image(pointer, value)
 

@@ -196,6 +196,8 @@ class LightGeometry(NamedTuple):
     channel: int | None = None
     link: Link | None = None
     shadow_link: Link | None = None
+    profile: str | None = None
+    gobo: str | None = None
 
 
 class LightGroupLook(_FrozenModel):
@@ -243,19 +245,33 @@ class _LightLook(_FrozenModel):
 
 
 class PointLook(_LightLook):
-    """A point light that emits equally in all directions; emission is radiant intensity, W/sr."""
+    """A point light that emits equally in all directions; emission is radiant intensity, W/sr.
+
+    `profile`: an uploaded IES file, "ies:<id>", by which it emits: intensity is emission times the file's over its
+    maximum. `direction`: its nadir. `rotation`: of its C0 plane about that, degrees. None: equally in all directions.
+    """
 
     kind: Literal["point"]
     position: Xyz
+    direction: Xyz = (0.0, -1.0, 0.0)
+    rotation: float = 0.0
+    profile: str | None = None
 
 
 class SpotLook(_LightLook):
-    """A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr."""
+    """A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr.
+
+    `gobo`: an uploaded image, "image:<id>", in the square about the cone; its linear RGB multiplies the intensity.
+    `profile`: as of a point light. `rotation`: of both about the direction, degrees.
+    """
 
     kind: Literal["spot"]
     position: Xyz
     direction: Xyz
     cone: tuple[float, float]
+    rotation: float = 0.0
+    profile: str | None = None
+    gobo: str | None = None
 
 
 class DirectionalLook(_LightLook):

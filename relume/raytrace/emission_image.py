@@ -19,6 +19,7 @@ from relume.raytrace.texture import sample_image
 from relume.scene.model import Texture
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 
 _MAX_PIECES = 4096  # if there are fewer triangles than that
 _MIN_MEAN = 1e-12
@@ -64,10 +65,14 @@ def image_emitter(
     )
     mean = areas @ radiance / max(float(areas.sum()), 1e-30)
     red, green, blue = mean.tolist()
+    return ImageEmitter(pieces, radiance, (red, green, blue), is_colored(radiance, mean, areas))
+
+
+def is_colored(radiance: Shaped[F32, "n 3"], mean: Shaped[F64, " 3"], weight: Shaped[F64, " n"]) -> bool:
+    """True if the color of an image varies. mean: of its radiance, by weight; weight: such as areas."""
     relative = radiance / np.maximum(mean, _MIN_MEAN)
-    chroma = np.ptp(relative[:, mean > _MIN_MEAN], axis=1) if (mean > _MIN_MEAN).any() else np.zeros(len(areas))
-    is_colored = bool(areas @ chroma > _MAX_CHROMA * areas.sum())
-    return ImageEmitter(pieces, radiance, (red, green, blue), is_colored)
+    chroma = np.ptp(relative[:, mean > _MIN_MEAN], axis=1) if (mean > _MIN_MEAN).any() else np.zeros(len(weight))
+    return bool(weight @ chroma > _MAX_CHROMA * weight.sum())
 
 
 def mapped_uvs(

@@ -13,12 +13,13 @@ from jaxtyping import Shaped
 from numpy.typing import ArrayLike, NDArray
 
 from relume.look import Look
-from relume.look.model import DirectionalLook, MeshLook, RectangleLook, SingleLightLook, SpotLook
+from relume.look.model import DirectionalLook, MeshLook, PointLook, RectangleLook, SingleLightLook, SpotLook
 from relume.look.single_lights import single_lights
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.raytrace.texture import MipMap
+from relume.reference.directional_intensity import directional_intensity
 from relume.reference.links import lit_meshes, shadow_casters
 from relume.reference.shape_samples import sample_shape, sample_sun, strata
 from relume.scene.model import Scene, Texture
@@ -101,14 +102,16 @@ class ReferenceEmitter:
             light_samples = _sample_triangles(self.triangles, self.uvs, len(position), num, rng)
             to_light, factor = self._surface_factor(position, *light_samples[:3])
             return to_light, factor if self.image is None else factor * _sample_texels(self.image, light_samples[3])
+        assert isinstance(light, PointLook | SpotLook)
         to_light = (np.array(light.position) - position)[:, None]
         distance_squared = (to_light**2).sum(axis=2)
+        direction = -to_light / np.sqrt(distance_squared)[..., None]
+        intensity = directional_intensity(light, direction) / distance_squared[..., None]
         if not isinstance(light, SpotLook):
-            return to_light, 1 / distance_squared[..., None]
+            return to_light, intensity
         inner, outer = np.cos(np.radians(light.cone))
-        cosine = -(to_light @ _unit(light.direction)) / np.sqrt(distance_squared)
-        falloff = np.clip((cosine - outer) / max(1e-3, inner - outer), 0, 1)
-        return to_light, (falloff**2 / distance_squared)[..., None]
+        falloff = np.clip((direction @ _unit(light.direction) - outer) / max(1e-3, inner - outer), 0, 1)
+        return to_light, falloff[..., None] ** 2 * intensity
 
     def _surface_factor(self, position: F64, light_position: F64, normal: F64, area: float) -> tuple[F64, F64]:
         to_light = light_position - position[:, None]

@@ -37,7 +37,18 @@ from relume_server.api import (
     solve,
     viewport,
 )
-from relume_server.api.assets import balls, btf_jobs, btfs, environments, images, imported, library, luts, materials
+from relume_server.api.assets import (
+    balls,
+    btf_jobs,
+    btfs,
+    environments,
+    ies,
+    images,
+    imported,
+    library,
+    luts,
+    materials,
+)
 from relume_server.api.pagination import check_query
 from relume_server.auth.middleware import AuthMiddleware
 from relume_server.auth.rules import methods_at
@@ -77,6 +88,7 @@ ROUTE_GROUPS = (
     library,
     balls,
     environments,
+    ies,
     images,
     luts,
     bakes,

@@ -26,7 +26,7 @@ from relume_server.errors import ForbiddenOriginError, TooLargeError, make_probl
 
 # up to the setting: a 4K environment is 25 MB, an 8K one about 100
 UPLOADS = (
-    "/api/scenes", "/api/environments", "/api/images", "/api/luts", "/api/materials/imported",
+    "/api/scenes", "/api/environments", "/api/ies", "/api/images", "/api/luts", "/api/materials/imported",
     "/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry",
 )  # fmt: skip
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and its form

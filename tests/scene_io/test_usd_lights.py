@@ -166,6 +166,13 @@ def test_cones_make_spots() -> None:
     np.testing.assert_allclose(light["emission"], 2 * np.pi * 0.25, rtol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["SphereLight", "RectLight"])
+def test_ies_files_of_any_light_are_a_warning(kind: str) -> None:
+    body = lit(kind, "asset inputs:shaping:ies:file = @lamp.ies@", schemas='prepend apiSchemas = ["ShapingAPI"]')
+    warnings = imported(usda(quad() + body)).warnings
+    assert [warning.severity for warning in warnings if "IES file of light" in warning] == ["unsupported"]
+
+
 def test_color_temperatures_are_those_of_usd() -> None:
     from pxr import UsdLux
 

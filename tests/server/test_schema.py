@@ -20,7 +20,7 @@ CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance,
 SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
 # scene imports start a process each and file forms are streamed: tests/hostile covers them
 UPLOADS = ["/api/scenes", "/api/materials/measured", "/api/environments", "/api/images", "/api/materials/imported"]
-UPLOADS += ["/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry", "/api/luts"]
+UPLOADS += ["/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry", "/api/ies", "/api/luts"]
 OPERATIONS = [result.ok() for result in SCHEMA.exclude(path=UPLOADS, method="POST").get_all_operations()]
 
 

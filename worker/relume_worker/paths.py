@@ -41,6 +41,11 @@ def environments_path(data_dir: Path) -> Path:
     return data_dir / "environments"
 
 
+def ies_path(data_dir: Path) -> Path:
+    """Folder of IES files; see `relume.assets.ies.ies_store`."""
+    return data_dir / "ies"
+
+
 def images_path(data_dir: Path) -> Path:
     """Folder of images for looks; see `relume.images.image_store`."""
     return data_dir / "images"

@@ -20,7 +20,7 @@ Normals = tuple[NormalMap | None, ...]
 
 _UNIT_GAIN: Rgb = (1.0, 1.0, 1.0)
 _ZERO_GAIN: Rgb = (0.0, 0.0, 0.0)
-_NO_IMAGES: Mapping[str, EmissionImage] = MappingProxyType({})
+_NO_IMAGES: Mapping[LightGeometry, EmissionImage] = MappingProxyType({})
 _MAX_CACHED_LIGHTS = 64  # every update strategy asks for the gains of a frame's lights, for every term
 
 
@@ -193,13 +193,13 @@ def _lit_local_lights(look: Look, solo_sources: frozenset[str] | None) -> Iterat
             yield LightSource(light.geometry, gain)
 
 
-def _emitted_parts(source: LightSource, images: Mapping[str, EmissionImage]) -> Iterator[LightSource]:
-    """Yield a light; one that emits an image with its mean color, and if it is colored, a light for each channel."""
+def _emitted_parts(source: LightSource, images: Mapping[LightGeometry, EmissionImage]) -> Iterator[LightSource]:
+    """Yield a light; one with an image or a gobo in its mean color, and if it is colored, a light for each channel."""
     geometry, gain = source
-    if geometry.image is None:
+    if geometry.image is None and geometry.gobo is None:
         yield source
         return
-    image = images[geometry.material]
+    image = images[geometry]
     red, green, blue = (g * mean for g, mean in zip(gain, image.mean, strict=True))
     if not image.is_colored:
         yield LightSource(geometry, (red, green, blue))
@@ -228,13 +228,18 @@ def links(look: Look) -> list[Link]:
 
 def emission_images(
     lights: Iterable[LightGeometry], find_image: Callable[[LightGeometry], EmissionImage | None]
-) -> Mapping[str, EmissionImage]:
-    """Return the images that lights emit, by material.
+) -> Mapping[LightGeometry, EmissionImage]:
+    """Return the images that lights emit.
 
     Args:
         lights: their geometries. find_image: as `LocalLightTransport.emission_image`; its errors propagate.
     """
-    return {light.material: image for light in lights if (image := find_image(light)) is not None}
+    return {light: image for light in lights if (image := find_image(light)) is not None}
+
+
+def images_by_material(images: Mapping[LightGeometry, EmissionImage]) -> Mapping[str, EmissionImage]:
+    """Return the images that surfaces emit, by material. images: from `emission_images`"""
+    return {light.material: image for light, image in images.items() if light.material}
 
 
 def is_same_environment(before: Illumination, after: Illumination) -> bool:
@@ -266,7 +271,7 @@ def illumination_from_look(
     *,
     has_bounces: bool,
     solo: Solo = None,
-    images: Mapping[str, EmissionImage] = _NO_IMAGES,
+    images: Mapping[LightGeometry, EmissionImage] = _NO_IMAGES,
 ) -> Illumination:
     """Return the illumination of a look.
 

@@ -25,6 +25,7 @@ from relume.live.fixed_camera.illumination import (
     emission_images,
     geometries,
     illumination_from_look,
+    images_by_material,
     is_solo,
     links,
     material_emission,
@@ -187,7 +188,8 @@ class ViewImages:
 
     def set_emission(self, light: Illumination) -> None:
         """Set the emission of surfaces in this light."""
-        images = emission_images((geometry for geometry, _ in light.local), self.transfer.local.emission_image)
+        sources = (geometry for geometry, _ in light.local)
+        images = images_by_material(emission_images(sources, self.transfer.local.emission_image))
         for name, material in self.by_name.items():
             image = images.get(name)
             material.set_emission(material_emission(light, name), image, self._emission_pattern)

@@ -19,6 +19,7 @@ from relume.live.fixed_camera.illumination import (
     emission_images,
     geometries,
     illumination_from_look,
+    images_by_material,
     links,
     picture_gain,
 )
@@ -432,7 +433,7 @@ class FreeCameraPicture:
             normals = [look.materials[name].normals for name in names]
             terms = [material_documents(look, name) for name in names]
             counts = [look.materials[name].basis_functions for name in names]
-            images = emission_images(geometries(look), self._transfer.emission_image)
+            images = images_by_material(emission_images(geometries(look), self._transfer.emission_image))
             emission = [images.get(name) for name in names]
             materials = MaterialState.from_terms(
                 terms,

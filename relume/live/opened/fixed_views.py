@@ -26,7 +26,7 @@ from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
-from relume.live.fixed_camera.illumination import Illumination, emission_images
+from relume.live.fixed_camera.illumination import Illumination, emission_images, images_by_material
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.free_camera.lobe_lights import LobeLight
 from relume.live.opened.few_lobe_rays import FewLobeRays
@@ -370,8 +370,8 @@ class BakedFixedViews:
 
     def _hit_images(self, light: Illumination) -> HitImages:
         """Return the images of a look that lobe rays meet."""
-        emission = emission_images((source.geometry for source in light.local), self.local.emission_image)
-        return hit_images(light.reflectances, self.material_names, emission)
+        images = emission_images((source.geometry for source in light.local), self.local.emission_image)
+        return hit_images(light.reflectances, self.material_names, images_by_material(images))
 
     def _mesh_emission(self, light: Illumination) -> Shaped[F32, "materials 3"]:
         """Return the radiance of the surfaces of each material that is a light; its image is relative to it."""

@@ -10,16 +10,18 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.assets.ies.ies_store import load_web
 from relume.brdf.texture_slots import EmissionImage
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.images.image_store import load_texture
+from relume.images.image_store import load_gobo, load_texture
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import (
     LightPoints,
     LocalLight,
     emitter_geometry,
     make_light_strata,
+    outer_angle,
     panel_triangles,
     prepare_local_lights,
 )
@@ -32,6 +34,7 @@ from relume.look.model import Link
 from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test, read_light_members
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.emission_image import ImageEmitter, image_emitter
+from relume.raytrace.intensity_table import Gobo, intensity_table, project_gobo
 from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
 from relume.raytrace.moving_light import MovingLight, trace_moving_light
 from relume.raytrace.scene_buffers import is_front
@@ -232,7 +235,7 @@ class LocalLights:
         if geometry.kind != "mesh":
             low, high = (end(self.positions, axis=0).astype(np.float64) for end in (np.min, np.max))
             sun = sun_triangles(geometry, (low + high) / 2, float(np.linalg.norm(high - low)) / 2)
-            return prepare_local_lights(geometry, sun)
+            return prepare_local_lights(geometry, sun, intensity_table=self._intensity_table(geometry))
         material, face_mask = self._emissive_faces(geometry.material)
         if geometry.image is not None:
             emitter = self._image_emitter(geometry.material, geometry.image)
@@ -252,12 +255,25 @@ class LocalLights:
             return prepare_local_lights(geometry, points=points)
         return prepare_local_lights(geometry, panel_triangles(members.light_fields("panels", (1.0,))))
 
+    def _intensity_table(self, geometry: LightGeometry) -> Shaped[F32, "polar azimuth"]:
+        """Intensity of a light over directions. Raises NotFoundError, SceneError: an asset cannot be loaded."""
+        web = None if geometry.profile is None else load_web(geometry.profile)
+        gobo = None if geometry.gobo is None else self._gobo(geometry.gobo, geometry.cone[1])
+        relative_gobo = None if gobo is None else gobo.relative_intensity(geometry.channel)
+        return intensity_table(outer_angle(geometry), web, relative_gobo)
+
+    def _gobo(self, image: str, outer: float) -> Gobo:
+        return self._cache.get_value((self._key, "gobo", image, outer), lambda: project_gobo(load_gobo(image), outer))
+
     def emission_image(self, geometry: LightGeometry) -> EmissionImage | None:
-        """Return the image that a light's surfaces emit; None if they emit as in the scene.
+        """Return the image that a light's surfaces emit, or a spot projects; None if it has none.
 
         Raises:
             NotFoundError, SceneError: the image cannot be loaded. StoreError: the bake is too old for it.
         """
+        if geometry.gobo is not None:
+            gobo = self._gobo(geometry.gobo, geometry.cone[1])
+            return EmissionImage(geometry.gobo, gobo.mean, gobo.is_colored)
         if geometry.image is None:
             return None
         emitter = self._image_emitter(geometry.material, geometry.image)

@@ -91,7 +91,7 @@ class UsdLightReader:
 
     def _add(self, prim: Any, to_world: Shaped[F64, "4 4"], label: str) -> None:
         kind = str(prim.GetTypeName())
-        self._warn_filters(prim, label)
+        self._warn_unsupported(prim, label)
         if kind in DOMES:
             self._add_dome(prim, to_world, label)
             return
@@ -223,9 +223,8 @@ class UsdLightReader:
         return [float(angle) * (1 - softness), float(angle)]
 
     def _add_spot(self, prim: Any, fields: dict[str, Any], intensity: F64, label: str) -> None:
-        for name, effect in (("focus", "focus"), ("ies:file", "IES profile")):
-            if prim.GetAttribute(f"inputs:shaping:{name}").Get(self._time):
-                self._warnings.append(unsupported(f"The {effect} of {label} isn't supported; its cone is even."))
+        if prim.GetAttribute("inputs:shaping:focus").Get(self._time):
+            self._warnings.append(unsupported(f"The focus of {label} isn't supported; its cone is even."))
         self._collector.add(
             self._collector.name(prim.GetName()), {"kind": "spot", **fields, "cone": self._cone(prim)}, intensity
         )
@@ -241,11 +240,14 @@ class UsdLightReader:
             return np.ones(3)
         return self._images.mean(ImageInput(path.path, is_srgb=True), label)
 
-    def _warn_filters(self, prim: Any, label: str) -> None:
+    def _warn_unsupported(self, prim: Any, label: str) -> None:
         from pxr import UsdLux
 
         if UsdLux.LightAPI(prim).GetFiltersRel().GetTargets():
             self._warnings.append(unsupported(f"Filters of {label} aren't supported."))
+        ies = prim.GetAttribute("inputs:shaping:ies:file").Get(self._time)
+        if ies and ies.path:
+            self._warnings.append(unsupported(f"The IES file of {label} isn't read; load it in the light's inspector."))
 
     def _add_dome(self, prim: Any, to_world: F64, label: str) -> None:
         """The environment; of several domes, the first."""

@@ -34,6 +34,7 @@ OwnedKind = Literal[
     "btf-job",
     "btf",
     "image",
+    "ies",
     "imported",
     "lut",
     "bake",

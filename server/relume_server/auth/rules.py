@@ -74,6 +74,8 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/luts": {"GET": VIEW, "POST": EDIT},
     "/api/luts/{lut}": {"GET": VIEW, "DELETE": EDIT},
     "/api/luts/{lut}/table": {"GET": VIEW},
+    "/api/ies": {"GET": VIEW, "POST": EDIT},
+    "/api/ies/{ies}": {"GET": VIEW, "DELETE": EDIT},
     "/api/images": {"GET": VIEW, "POST": EDIT},
     "/api/images/{image}": {"GET": VIEW, "DELETE": EDIT},
     "/api/images/{image}/metalness": {"POST": EDIT},

@@ -17,6 +17,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from relume.assets.asset_store import AssetStore
 from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
+from relume.assets.ies.ies_store import IES_FILES
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
 from relume.core.errors import RelumeError
@@ -32,6 +33,7 @@ from relume_server.io.import_request import SUMMARY, UPLOAD_PREFIX, ImportReques
 from relume_worker.ledger import Ledger
 from relume_worker.paths import (
     environments_path,
+    ies_path,
     images_path,
     imported_materials_path,
     luts_path,
@@ -50,6 +52,7 @@ _STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
     "environment": (ENVIRONMENTS, environments_path, "environment"),
     "image": (IMAGES, images_path, "image"),
     "lut": (LUTS, luts_path, "lut"),
+    "ies": (IES_FILES, ies_path, "ies"),
     "material": (MATERIALS, materials_path, "material"),
     "imported": (IMPORTED, imported_materials_path, "imported"),
 }

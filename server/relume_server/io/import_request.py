@@ -31,7 +31,9 @@ SUMMARY = "summary.json"
 """File with the summary of a scene, next to its folder."""
 IMAGES = "images"
 """Folder with the images of imported materials, next to the material's."""
-ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "lut", "material", "imported", "tile"]
+ImportKind = Literal[
+    "scene", "environment", "built_in", "grounded", "image", "ies", "lut", "material", "imported", "tile"
+]
 
 
 @dataclass(frozen=True)
@@ -151,6 +153,8 @@ def _import(request: ImportRequest) -> str:
         return _import_image(request)
     if request.kind == "lut":
         return _import_lut(request)
+    if request.kind == "ies":
+        return _import_ies(request)
     if request.kind == "material":
         return _import_material(request)
     if request.kind == "imported":
@@ -176,6 +180,12 @@ def _import_lut(request: ImportRequest) -> str:
     from relume.luts.lut_store import store_lut
 
     return store_lut(Path(request.into), Path(request.file), request.name).id
+
+
+def _import_ies(request: ImportRequest) -> str:
+    from relume.assets.ies.ies_store import store_ies
+
+    return store_ies(Path(request.into), Path(request.file), request.name).id
 
 
 def _import_material(request: ImportRequest) -> str:

@@ -72,6 +72,7 @@ def main() -> None:
 def _load() -> None:
     """Load the readers in advance."""
     import relume.assets.environments.read_environment
+    import relume.assets.ies.ies_store
     import relume.assets.measured.measured_store
     import relume.images.image_store
     import relume.scene_io.import_scene

@@ -9,6 +9,7 @@ from pathlib import Path
 from relume.assets.asset_store import AssetStore
 from relume.assets.btf.btf_store import STORE as BTFS
 from relume.assets.environments.environment_store import STORE as ENVIRONMENTS
+from relume.assets.ies.ies_store import IES_FILES
 from relume.assets.measured.measured_store import STORE as MATERIALS
 from relume.brdf.texture_slots import IMAGES
 from relume.imported_materials.material_store import STORE as IMPORTED
@@ -16,6 +17,7 @@ from relume.luts.lut_store import LUTS
 from relume_worker.paths import (
     btfs_path,
     environments_path,
+    ies_path,
     images_path,
     imported_materials_path,
     luts_path,
@@ -32,6 +34,7 @@ def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
         (ENVIRONMENTS, environments_path(data_dir)),
         (IMAGES, images_path(data_dir)),
         (LUTS, luts_path(data_dir)),
+        (IES_FILES, ies_path(data_dir)),
     ]
 
 

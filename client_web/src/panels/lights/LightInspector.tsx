@@ -11,7 +11,9 @@ import { LabeledSlider } from "../../ui/LabeledSlider";
 import { NumberField } from "../../ui/NumberField";
 import { Emission } from "./Emission";
 import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "./lightFields";
-import { placeLight } from "./handleGeometry";
+import { GoboField } from "./GoboField";
+import { isAimed, placeLight } from "./handleGeometry";
+import { IesField } from "./IesField";
 import { LinkField } from "./LinkField";
 import { createGroup, groupOfLight, lightGroups, moveToGroup } from "./lightGroups";
 import { completeLight, LIGHT_KINDS, labelOf, changeKind, isAddedKind, type AddedKind } from "./lightKinds";
@@ -175,13 +177,15 @@ export function LightInspector({ name, light }: NamedLight) {
         <LightKindSelect name={name} light={light} />
         <GroupSelect name={name} />
         <Emission name={name} light={light} />
-        {"position" in light && "direction" in light && <AimLockSwitch />}
+        {isAimed(light) && <AimLockSwitch />}
         {numbersFieldsOf(light).map((field) => (
           <NumbersFields key={field.label} name={name} light={light} numbersField={field} />
         ))}
         {angleFieldsOf(light).map((field) => (
           <AngleFieldSlider key={field.label} name={name} light={light} angleField={field} />
         ))}
+        {"profile" in light && <IesField name={name} profile={light.profile ?? null} />}
+        {"gobo" in light && <GoboField name={name} gobo={light.gobo ?? null} />}
         <LinkField label="Lights" path={lightPath(name, "link")} link={light.link ?? null} />
         <LinkField label="Shadows" path={lightPath(name, "shadow_link")} link={light.shadow_link ?? null} />
       </section>

@@ -6,7 +6,7 @@ import { add, cross, dot, length, scale, subtract, roundComponents, normalize } 
 /** Lights with a position and a target. */
 type AimedLight = Extract<Light, { kind: "spot" | "rectangle" | "disc" }>;
 
-const isAimed = (light: Light): light is AimedLight =>
+export const isAimed = (light: Light): light is AimedLight =>
   light.kind === "spot" || light.kind === "rectangle" || light.kind === "disc";
 
 /** World positions of a light's handles: position and target; null if the light has none. */

@@ -150,6 +150,12 @@ const ANGLES: readonly AngleField[] = [
   },
 ];
 
-export const numbersFieldsOf = (light: Light) => NUMBERS.filter(({ field }) => field in light);
+/** True if a field of a light changes its image: the frame of a point or a spot matters only with an IES file or gobo. */
+function matters(light: Light, field: string): boolean {
+  const isEven = "profile" in light && light.profile == null && !("gobo" in light && light.gobo != null);
+  return field in light && !(isEven && (field === "rotation" || (field === "direction" && light.kind === "point")));
+}
+
+export const numbersFieldsOf = (light: Light) => NUMBERS.filter(({ field }) => matters(light, field));
 export const angleFieldsOf = (light: Light) =>
-  ANGLES.filter(({ field, kind }) => field in light && (kind ?? light.kind) === light.kind);
+  ANGLES.filter(({ field, kind }) => matters(light, field) && (kind ?? light.kind) === light.kind);

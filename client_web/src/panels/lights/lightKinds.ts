@@ -1,6 +1,7 @@
 /** The kinds of light: labels, and creating a new one. */
 import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../../protocol";
+import { isAimed } from "./handleGeometry";
 import { add, length, scale, subtract, roundComponents } from "./vector";
 
 /** Kinds that can be added; emissive meshes come with a scene or an emission map, sources of many lights with a scene. */
@@ -138,7 +139,7 @@ const COPY_OFFSET = 0.25;
 /** A copy of a light, offset so that the handles do not coincide. */
 export function offsetCopy(light: Light): Light {
   if (!("position" in light)) return { ...light };
-  const reach = "direction" in light && light.kind !== "tube" ? length(light.direction) : 1;
+  const reach = isAimed(light) ? length(light.direction) : 1;
   return { ...light, position: roundComponents(add(light.position, [COPY_OFFSET * Math.max(reach, 0.1), 0, 0])) };
 }
 

@@ -18,19 +18,27 @@ const POWER: PhotometricUnits = { label: "Power", watts: "W", lumens: "lm" };
 const IRRADIANCE: PhotometricUnits = { label: "Illuminance", watts: "W/m²", lumens: "lx" };
 /** For many lights as one source, whose number belongs to the scene. */
 const INTENSITY: PhotometricUnits = { label: "Mean intensity", watts: "W/sr", lumens: "cd" };
+/** For lights with an IES file or a gobo: as data sheets state it. */
+const PEAK_INTENSITY: PhotometricUnits = { label: "Peak intensity", watts: "W/sr", lumens: "cd" };
 /** For emissive meshes and many panels, whose area belongs to the scene. */
 const RADIANCE: PhotometricUnits = { label: "Radiance", watts: "W/sr/m²", lumens: "cd/m²" };
 
 export function unitsOf(light: Light): PhotometricUnits {
   if (light.kind === "directional") return IRRADIANCE;
   if (light.kind === "points") return INTENSITY;
+  if (isShaped(light)) return PEAK_INTENSITY;
   return light.kind === "mesh" || light.kind === "panels" ? RADIANCE : POWER;
 }
+
+/** True for a light with an IES file or a gobo: its power depends on it. */
+const isShaped = (light: Light) =>
+  ("profile" in light && light.profile != null) || ("gobo" in light && light.gobo != null);
 
 const cosine = (degrees: number) => Math.cos((degrees * Math.PI) / 180);
 
 /** Factor from emission to power: the integral over directions and area. */
 function emittingExtent(light: Light): number {
+  if (isShaped(light)) return 1;
   switch (light.kind) {
     case "point":
       return 4 * Math.PI;

@@ -9,6 +9,7 @@ import type {
   CommentRequest,
   DryRunBody,
   EnvironmentBody,
+  IesBody,
   ImageBody,
   ZernikeFitBody,
   ZernikeFitRequest,
@@ -179,6 +180,10 @@ export const getLutTable = async (name: string): Promise<ArrayBuffer> =>
   (await request(`${lutPath(name)}/table`)).arrayBuffer();
 export async function deleteLut(name: string): Promise<void> {
   await request(lutPath(name), { method: "DELETE" });
+}
+export const listIes = () => getJson<IesBody[]>("/api/ies");
+export async function deleteIes(id: string): Promise<void> {
+  await request(`/api/ies/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 export const listImages = () => getJson<ImageBody[]>("/api/images");
 export async function deleteImage(id: string): Promise<void> {

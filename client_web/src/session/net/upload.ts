@@ -3,6 +3,7 @@ import type { DroppedFile } from "../../start/files/dropTypes";
 import type {
   BtfJobBody,
   EnvironmentBody,
+  IesBody,
   ImageBody,
   ImportedBody,
   ImportOptions,
@@ -62,6 +63,13 @@ export function uploadEnvironment(file: File, progress: (fraction: number) => vo
   const form = new FormData();
   form.append("environment", file);
   return postForm("/api/environments", form, progress) as Promise<EnvironmentBody>;
+}
+
+/** Upload an IES file, named after it. */
+export function uploadIes(file: File, progress: (fraction: number) => void): Promise<IesBody> {
+  const form = new FormData();
+  form.append("ies", file);
+  return postForm("/api/ies", form, progress) as Promise<IesBody>;
 }
 
 /** Upload a texture image, named after its file. */

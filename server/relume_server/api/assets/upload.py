@@ -17,7 +17,7 @@ from relume_server.services import Services
 async def store_upload(
     file: UploadFile,
     name: str,
-    kind: Literal["environment", "image", "lut", "material", "imported"],
+    kind: Literal["environment", "image", "ies", "lut", "material", "imported"],
     reservation: Reservation,
     services: Services,
 ) -> str:

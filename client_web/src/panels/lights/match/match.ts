@@ -166,7 +166,14 @@ function sendGesture(current: Gesture, materials: string[] = []): void {
   const needsPicture = strokes.length === 0 || kind === "reference";
   const change = kind === "color" || (needsPicture && changesColor.peek()) ? "color" : "intensity";
   const rotate = strokes.length === 0 && rotatesEnvironment.peek();
-  const body = { ...base, strokes, change, rotate, materials, ...(needsPicture ? referenceBody() : {}) } satisfies SolveRequest;
+  const body = {
+    ...base,
+    strokes,
+    change,
+    rotate,
+    materials,
+    ...(needsPicture ? referenceBody() : {}),
+  } satisfies SolveRequest;
   matchStatus.value = matchStatus.peek() === PREPARING ? PREPARING : matchStatus.peek() || SOLVING;
   requests.send({ body, gesture: current, isFinal: current.isEnded });
 }

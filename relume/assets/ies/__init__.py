@@ -1,0 +1,1 @@
+"""IES files: luminous intensity of luminaires over directions."""
