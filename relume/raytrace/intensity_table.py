@@ -83,7 +83,9 @@ def _grid(outer: float, num_polar: int, num_azimuths: int) -> tuple[Shaped[F64, 
     return np.linspace(0, np.radians(outer), num_polar), np.linspace(0, 2 * np.pi, num_azimuths)
 
 
-def _interpolate_rows(table: Shaped[F32 | F64, "rows columns"], position: Shaped[F64, " n"]) -> Shaped[F64, "n columns"]:
+def _interpolate_rows(
+    table: Shaped[F32 | F64, "rows columns"], position: Shaped[F64, " n"]
+) -> Shaped[F64, "n columns"]:
     """Interpolate between the rows of a table linearly."""
     row = np.minimum(position.astype(np.intp), max(len(table) - 2, 0))
     fraction = (position - row)[:, None]

@@ -385,12 +385,13 @@ def get_ior(look: Any) -> float:
 
 
 def light_image(view: FakeView, look: Any) -> np.ndarray:
-    """A quarter of the pixels: the environment lights them all, and local lights the left half."""
+    """A quarter of the pixels, of the color of a Lambert surface over 0.5: the environment lights them all, and local
+    lights the left half."""
     image = np.empty((view.height // 2, view.width // 2, 3), np.float32)
     image[:] = look.environment.gain
     for light in look.lights.values():
         image[:, : view.width // 4] += np.asarray(light.gain, np.float32)
-    return image
+    return image * np.array(look.materials["Paper"].terms[0]["color"], np.float32) / np.float32(0.5)
 
 
 def exact_pixel(look: Any) -> float:
