@@ -27,5 +27,7 @@ test("a plain light has no direction of an IES file", () => {
 });
 
 test("a polar curve starts at the nadir, goes up on the right and back on the left", () => {
-  expect(polarCurve([1, 0.5, 0.25], [1, 0.5, 0.25])).toBe("M0.0 40.0L20.0 0.0L0.0 -10.0L-0.0 -10.0L-20.0 0.0L0.0 40.0Z");
+  expect(polarCurve([1, 0.5, 0.25], [1, 0.5, 0.25])).toBe(
+    "M0.0 40.0L20.0 0.0L0.0 -10.0L-0.0 -10.0L-20.0 0.0L0.0 40.0Z",
+  );
 });
