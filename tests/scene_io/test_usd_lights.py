@@ -168,7 +168,7 @@ def test_cones_make_spots() -> None:
 
 @pytest.mark.parametrize("kind", ["SphereLight", "RectLight"])
 def test_ies_files_of_any_light_are_a_warning(kind: str) -> None:
-    scene = lit(kind, "asset inputs:shaping:ies:file = @lamp.ies@", schemas='prepend apiSchemas = ["ShapingAPI"]')
+    scene = lit(kind, "asset inputs:shaping:ies:file = @web.ies@", schemas='prepend apiSchemas = ["ShapingAPI"]')
     assert [warning.severity for warning in scene.warnings if "IES file of light" in warning] == ["unsupported"]
 
 

@@ -1,6 +1,6 @@
 """Import of IES files, LM-63-1986 to 2019, from untrusted sources: photometric webs of type C.
 
-    I(θ, C) = candela · multiplier · ballast factor [· ballast-lamp factor, until 1995]
+    I(θ, C) = candela · multiplier · ballast factor [· photometric factor, until 1995]
 
 θ is measured from the nadir, C about it. The web is interpolated bilinearly between the angles of the file, and zero
 outside them.
@@ -29,7 +29,7 @@ MAX_ANGLES = 2_000  # of each kind
 POLAR_ANGLES, AZIMUTHS = 721, 361  # of the stored web: steps of 0.25° and 1°, which files hardly exceed
 _MAX_CANDELA = 1e12
 _TILT = re.compile(r"^\s*TILT\s*=[ \t]*(\S*)", re.MULTILINE | re.IGNORECASE)
-_FUTURE_USE = re.compile(r"LM-63-(200\d|201\d|202\d)")  # in these, the ballast-lamp factor has no meaning
+_FUTURE_USE = re.compile(r"LM-63-(200\d|201\d|202\d)")  # in these, the photometric factor has no meaning
 _NUM_FIELDS = 13
 _ANGLE_KINDS = ("vertical", "horizontal")
 _PHOTOMETRY = {1: "C", 2: "B", 3: "A"}
@@ -99,7 +99,7 @@ def _leading_numbers(words: list[str]) -> F64:
 
 
 def _skip_tilt(values: F64, label: str) -> F64:
-    """Skip the lamp's position, the number of angles, the angles, and their factors."""
+    """Skip the position, the number of angles, the angles, and their factors."""
     num_angles = _count(values, 1, label, "tilt angles")
     return values[2 + 2 * num_angles :]
 
