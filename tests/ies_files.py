@@ -6,11 +6,11 @@ import numpy as np
 
 
 def ies_text(candela, polar, azimuth=(0,), *, head="IESNA:LM-63-2002", tilt="NONE", factors=(1, 1, 1), kind=1):
-    """A file with the candela of each azimuth, as rows; factors: multiplier, ballast and ballast-lamp."""
+    """A file with the candela of each azimuth, as rows; factors: multiplier, ballast and photometric factor."""
     candela = np.atleast_2d(candela)
     lines = [head, "[TEST] made by code", f"TILT={tilt}"]
-    multiplier, ballast, lamp = factors
-    lines += [f"1 1000 {multiplier} {len(polar)} {len(azimuth)} {kind} 2 0 0 0", f"{ballast} {lamp} 50"]
+    multiplier, ballast, photometric = factors
+    lines += [f"1 1000 {multiplier} {len(polar)} {len(azimuth)} {kind} 2 0 0 0", f"{ballast} {photometric} 50"]
     lines += [" ".join(f"{value:.6g}" for value in row) for row in (polar, azimuth, *candela)]
     return "\r\n".join(lines) + "\r\n"
 

@@ -1,6 +1,6 @@
 """Import of IES files, LM-63-1986 to 2019, from untrusted sources: photometric webs of type C.
 
-    I(θ, C) = candela · multiplier · ballast factor [· ballast-lamp factor, until 1995]
+    I(θ, C) = candela · multiplier · ballast factor [· photometric factor, until 1995]
 
 θ is measured from the nadir, C about it. The web is interpolated bilinearly between the angles of the file, and zero
 outside them.
@@ -29,7 +29,7 @@ MAX_ANGLES = 2_000  # of each kind
 POLAR_ANGLES, AZIMUTHS = 721, 361  # of the stored web: steps of 0.25° and 1°, which files hardly exceed
 _MAX_CANDELA = 1e12
 _TILT = re.compile(r"^\s*TILT\s*=[ \t]*(\S*)", re.MULTILINE | re.IGNORECASE)
-_FUTURE_USE = re.compile(r"LM-63-(200\d|201\d|202\d)")  # in these, the ballast-lamp factor has no meaning
+_FUTURE_USE = re.compile(r"LM-63-(200\d|201\d|202\d)")  # in these, the photometric factor has no meaning
 _NUM_FIELDS = 13
 _ANGLE_KINDS = ("vertical", "horizontal")
 _PHOTOMETRY = {1: "C", 2: "B", 3: "A"}
@@ -67,8 +67,8 @@ def read_ies(path: Path, name: str) -> tuple[PhotometricWeb, tuple[ImporterWarni
     if tilt[1].upper() != "NONE":
         warnings = (approximated(f"The tilt of IES file {quote(name)} was ignored: it emits as it was measured."),)
     values = _skip_tilt(_numbers(numbers), label) if tilt[1].upper() == "INCLUDE" else _numbers(numbers)
-    has_lamp_factor = _FUTURE_USE.search(text[: tilt.start()]) is None
-    return _web(values, label, has_lamp_factor=has_lamp_factor), warnings
+    has_photometric_factor = _FUTURE_USE.search(text[: tilt.start()]) is None
+    return _web(values, label, has_photometric_factor=has_photometric_factor), warnings
 
 
 def _decode(data: bytes) -> str:
@@ -99,7 +99,7 @@ def _leading_numbers(words: list[str]) -> F64:
 
 
 def _skip_tilt(values: F64, label: str) -> F64:
-    """Skip the lamp's position, the number of angles, the angles, and their factors."""
+    """Skip the position, the number of angles, the angles, and their factors."""
     num_angles = _count(values, 1, label, "tilt angles")
     return values[2 + 2 * num_angles :]
 
@@ -112,7 +112,7 @@ def _count(values: F64, index: int, label: str, quantity: str) -> int:
     return int(value)
 
 
-def _web(values: F64, label: str, *, has_lamp_factor: bool) -> PhotometricWeb:
+def _web(values: F64, label: str, *, has_photometric_factor: bool) -> PhotometricWeb:
     num_polar, num_azimuths = (_count(values, 3 + k, label, f"{kind} angles") for k, kind in enumerate(_ANGLE_KINDS))
     num_values = _NUM_FIELDS + num_polar + num_azimuths + num_polar * num_azimuths
     if len(values) < num_values:
@@ -128,7 +128,7 @@ def _web(values: F64, label: str, *, has_lamp_factor: bool) -> PhotometricWeb:
         raise SceneError(f"{label} has photometry of type {photometry}; export it as type C")
     polar, azimuth, candela = np.split(values[_NUM_FIELDS:], [num_polar, num_polar + num_azimuths])
     _check_angles(polar, azimuth, label)
-    factor = values[2] * values[10] * (values[11] if has_lamp_factor else 1)
+    factor = values[2] * values[10] * (values[11] if has_photometric_factor else 1)
     intensity = factor * candela.reshape(num_azimuths, num_polar)
     maximum = float(intensity.max())
     if intensity.min() < 0 or not 0 < maximum <= _MAX_CANDELA:

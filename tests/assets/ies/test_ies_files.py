@@ -25,7 +25,7 @@ def at(web, polar, azimuth=0):
 
 
 @pytest.mark.parametrize(
-    "head", ["IESNA:LM-63-2002", "IES:LM-63-2019", "IESNA:LM-63-1995", "IESNA91", "A lamp of 1986"]
+    "head", ["IESNA:LM-63-2002", "IES:LM-63-2019", "IESNA:LM-63-1995", "IESNA91", "A spot of 1986"]
 )
 def test_intensity_is_relative_to_the_maximum_and_factors_multiply_it(tmp_path, head):
     text = ies_text(cosine_web(2, POLAR), POLAR, head=head, factors=(3, 0.9, 0.5))
