@@ -5,6 +5,8 @@ from pathlib import Path
 
 from relume.assets.environments import environment_store as environments
 from relume.assets.environments import read_environment as environment
+from relume.assets.ies import read_ies
+from relume.assets.ies.ies_store import IES_FILES
 from relume.assets.measured import measured_store as materials
 from relume.brdf import term_validation as terms
 from relume.brdf.texture_slots import IMAGES
@@ -54,6 +56,9 @@ ROWS = {
     "uploaded images; size; file": (
         f"{IMAGES.max_entries:,}; {read_image.MAX_SIDE:,} × {read_image.MAX_SIDE:,}; "
         f"{read_image.MAX_FILE_BYTES // MILLION} MB"
+    ),
+    "uploaded IES files; file; angles": (
+        f"{IES_FILES.max_entries:,}; {read_ies.MAX_FILE_BYTES // MILLION} MB; {read_ies.MAX_ANGLES:,} of each kind"
     ),
     "imported measured materials": f"{materials.STORE.max_entries}",
     "pixels of a baked view; environment triangles of a bake": f"{direct.MAX_PIXELS:,}; {sphere_tiles.MAX_LIGHTS:,}",
