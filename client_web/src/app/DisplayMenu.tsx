@@ -1,4 +1,4 @@
-/** White balance and the display LUT of the look, and the difference of A and B. */
+/** White balance, contrast and the display LUT of the look, and the difference of A and B. */
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { editValue } from "../edit/edit";
 import { DEFAULTS, RANGES } from "../look.gen";
@@ -50,6 +50,20 @@ function WhiteBalance() {
         {isPickingGray.value ? "Click a gray surface…" : "Pick gray"}
       </button>
     </>
+  );
+}
+
+function Contrast() {
+  return (
+    <LabeledSlider
+      label="Contrast"
+      title="Steepness about middle gray, before the tone map"
+      value={(look.value?.display ?? DEFAULTS.display).contrast}
+      initial={DEFAULTS.display.contrast}
+      {...RANGES.display.contrast}
+      scale="log"
+      onChange={(value) => editValue("Contrast", "/display/contrast", value)}
+    />
   );
 }
 
@@ -136,6 +150,7 @@ export function DisplayMenu() {
       {open && (
         <div class="menu-body display-menu" role="group" aria-label="Display options">
           <WhiteBalance />
+          <Contrast />
           <LutSelect />
           <DifferenceSelect />
         </div>

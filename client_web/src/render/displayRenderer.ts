@@ -139,9 +139,10 @@ export class DisplayRenderer {
     const { gl, canvas } = this;
     if (gl.isContextLost()) return;
     gl.viewport(0, 0, canvas.width, canvas.height);
-    const { matrix, toneMap, lut } = state.display;
+    const { matrix, contrast, toneMap, lut } = state.display;
     const program = this.use({
       toneMap: typeof toneMap === "string" ? toneMap : "table",
+      contrast: contrast !== 1,
       lut: lut !== null,
       falseColor: state.falseColor,
       isMinified: state.transform[2] < this.size[0],
@@ -161,6 +162,7 @@ export class DisplayRenderer {
     gl.uniform4f(program.uniform("uImageRect"), ...state.transform);
     gl.uniform2f(program.uniform("uSize"), ...this.size);
     gl.uniformMatrix3fv(program.uniform("uDisplayMatrix"), true, matrix.flat());
+    gl.uniform1f(program.uniform("uContrast"), contrast);
     gl.uniform1f(program.uniform("uWipe"), state.wipe);
     gl.uniform1i(program.uniform("uHover"), state.hover);
     gl.uniform1i(program.uniform("uSolo"), state.solo);

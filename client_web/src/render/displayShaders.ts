@@ -4,6 +4,7 @@
  * times as fast without them. */
 
 import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
+import { MIDDLE_GRAY } from "./color/contrast";
 import { BLACK, LMS_TO_ITP, PQ, RANGES, RGB_TO_LMS, SCALES, type DifferenceMode } from "./color/difference";
 import type { Matrix } from "./color/whiteBalance";
 
@@ -11,6 +12,8 @@ import type { Matrix } from "./color/whiteBalance";
 export interface DisplayFeatures {
   toneMap: "none" | "agx" | "filmic" | "table";
   falseColor: boolean;
+  /** Contrast is not neutral. */
+  contrast: boolean;
   /** A display LUT follows the tone map. */
   lut: boolean;
   /** The image is minified. */
@@ -47,6 +50,7 @@ export function fragmentShader(features: DisplayFeatures): string {
           : features.toneMap === "table"
             ? "TABLE"
             : "PLAIN",
+    features.contrast && !features.falseColor && "CONTRAST",
     features.lut && !features.falseColor && "LUT",
     features.isMinified && "MINIFIED",
     features.displayReferred && "DISPLAY_REFERRED",
@@ -108,6 +112,7 @@ uniform vec2 uCanvas;          // device pixels
 uniform vec4 uImageRect;           // left, top, width, height of the image, device pixels from the top left
 uniform vec2 uSize;            // size of the image in pixels
 uniform mat3 uDisplayMatrix;   // exposure times white balance
+uniform float uContrast;       // slope of log radiance about middle gray
 uniform float uWipe;           // fraction of the image left of which the A side shows
 uniform int uHover;            // material to outline
 uniform int uSolo;             // solo material
@@ -187,6 +192,9 @@ vec3 falseColor(vec3 x) {
 }
 
 vec3 toneMapped(vec3 x) {
+#ifdef CONTRAST
+  x = min(${MIDDLE_GRAY} * pow(x / ${MIDDLE_GRAY}, vec3(uContrast)), 1e9);  // tone maps square it
+#endif
 #if defined(AGX)
   return agx(x);
 #elif defined(FILMIC)
@@ -233,7 +241,7 @@ vec4 sampled(vec2 uv, bool reference) {
 
 // filtered: shared exponents cannot be mipmapped, so four taps across the pixel footprint
 vec4 filtered(vec2 uv, bool reference) {
-#ifdef SHRUNK
+#ifdef MINIFIED
   vec2 d = (uSize / uImageRect.zw - 1.0) * 0.25 / uSize;
   return 0.25 * (sampled(uv + d, reference) + sampled(uv - d, reference)
     + sampled(uv + vec2(d.x, -d.y), reference) + sampled(uv + vec2(-d.x, d.y), reference));
