@@ -58,6 +58,7 @@ test("the shader of a plain image has no difference in it", () => {
     brush: false,
     outline: false,
     solo: false,
+    canvasColor: "srgb",
   } as const;
   expect(fragmentShader({ ...features, difference: "off" })).not.toContain("#define DIFFERENCE");
   expect(fragmentShader({ ...features, difference: "delta_e" })).toContain("#define DIFFERENCE_DELTA_E");

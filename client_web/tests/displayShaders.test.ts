@@ -16,6 +16,7 @@ const PLAIN: DisplayFeatures = {
   brush: false,
   outline: false,
   solo: false,
+  canvasColor: "srgb",
 };
 const ALL: DisplayFeatures = {
   toneMap: "none",
@@ -31,6 +32,7 @@ const ALL: DisplayFeatures = {
   brush: true,
   outline: true,
   solo: true,
+  canvasColor: "srgb",
 };
 const VARIANTS: DisplayFeatures[] = [
   ALL,
@@ -39,10 +41,12 @@ const VARIANTS: DisplayFeatures[] = [
   { ...ALL, toneMap: "table" },
   { ...ALL, falseColor: true },
   { ...ALL, difference: "delta_e" },
+  { ...PLAIN, canvasColor: "display-p3" },
+  { ...PLAIN, canvasColor: "hdr" },
 ];
 
 const definitions = (features: DisplayFeatures): string[] =>
-  [...fragmentShader(features).matchAll(/^#define ([A-Z_]+)$/gm)].map(([, name]) => name as string);
+  [...fragmentShader(features).matchAll(/^#define ([A-Z_0-9]+)$/gm)].map(([, name]) => name as string);
 const conditions = (source: string): string[] =>
   [...source.matchAll(/^#(?:ifdef|ifndef|if|elif) (.*)$/gm)].flatMap(([, text]) => text?.match(/[A-Z_0-9]+/g) ?? []);
 
@@ -54,4 +58,19 @@ test("each condition of the shader is a feature, so that no code is dead", () =>
 test("each feature but the plain tone map is tested by the shader", () => {
   const tested = new Set([...conditions(fragmentShader(PLAIN)), "PLAIN"]);
   expect(VARIANTS.flatMap(definitions).filter((name) => !tested.has(name))).toEqual([]);
+});
+
+test("standard canvases show display values as they are", () => {
+  expect(definitions(PLAIN)).toEqual(["PLAIN"]);
+});
+
+test.each<[string, Partial<DisplayFeatures>, boolean]>([
+  ["no tone map", {}, true],
+  ["AgX", { toneMap: "agx" }, false],
+  ["a view", { toneMap: "table" }, false],
+  ["a LUT", { lut: true }, false],
+  ["false color", { falseColor: true }, false],
+  ["a difference", { difference: "delta_e" }, false],
+])("an HDR canvas with %s", (_, features, expected) => {
+  expect(definitions({ ...PLAIN, canvasColor: "hdr", ...features }).includes("UNBOUNDED")).toBe(expected);
 });

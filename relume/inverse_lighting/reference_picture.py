@@ -29,8 +29,8 @@ def read_reference(data: bytes, display: DisplayLook, size: tuple[int, int]) -> 
     """Decode a reference picture as a target.
 
     HDR and OpenEXR files have linear radiance. Other files have display values, from which tone map, contrast, exposure
-    and white balance of the look are removed; an OpenColorIO view counts as sRGB, and a display LUT stays. Clipped, transparent
-    and invalid pixels have no weight.
+    and white balance of the look are removed; an OpenColorIO view counts as sRGB, and a display LUT stays. Clipped,
+    transparent and invalid pixels have no weight.
 
     Args:
         data: contents of the file. display: of the look. size: width and height of the target; a picture of another

@@ -58,7 +58,14 @@ export const displayLutFor = (name: string | null | undefined): LutTable | null 
   name ? lutTables.value.get(name) : null;
 
 /** The display transform of a look without waiting: falls back to AgX, and to no LUT, while loading. */
-export const transformOf = ({ exposure, temperature, tint, contrast, tone_map, lut }: Look["display"]): DisplayTransform => ({
+export const transformOf = ({
+  exposure,
+  temperature,
+  tint,
+  contrast,
+  tone_map,
+  lut,
+}: Look["display"]): DisplayTransform => ({
   matrix: displayMatrix(exposure, temperature, tint),
   contrast,
   toneMap: lutFor(tone_map) ?? "agx",
