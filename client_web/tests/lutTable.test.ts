@@ -44,9 +44,9 @@ test.each<Rgb>([
 });
 
 test("exposure comes before a view, and what is below nothing is black", () => {
-  expect(toDisplay([0.5, 0.1, 2], { matrix: displayMatrix(1, 6500, 0), contrast: 1, toneMap: MIXED, lut: null })).toEqual(
-    sampleLut(MIXED, [1, 0.2, 4]),
-  );
+  expect(
+    toDisplay([0.5, 0.1, 2], { matrix: displayMatrix(1, 6500, 0), contrast: 1, toneMap: MIXED, lut: null }),
+  ).toEqual(sampleLut(MIXED, [1, 0.2, 4]));
   expect(sampleLut(MIXED, [-1, -2, -3])).toEqual(sampleLut(MIXED, [0, 0, 0]));
 });
 
