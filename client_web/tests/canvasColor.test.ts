@@ -6,7 +6,7 @@ import {
   readAbilities,
   whyUnavailable,
   type CanvasColor,
-} from "../src/render/canvasColor";
+} from "../src/render/color/canvasColor";
 import { REC709_TO_P3 } from "../src/render/color/displayP3";
 import { srgbDecode, srgbEncode } from "../src/render/color/tonemap";
 import { transformColor } from "../src/render/color/whiteBalance";

@@ -13,7 +13,7 @@ import {
   LUT_SUFFIX,
   offerToDeleteLut,
 } from "../panels/looks/displayLuts";
-import { whyUnavailable, type CanvasColor } from "../render/canvasColor";
+import { whyUnavailable, type CanvasColor } from "../render/color/canvasColor";
 import type { DifferenceMode } from "../render/color/difference";
 import { canvasAbilities, canvasColor, canvasColorChoice, chooseCanvasColor } from "../state/canvasColor";
 import { difference, isPickingGray } from "../state/display";

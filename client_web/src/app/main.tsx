@@ -16,7 +16,7 @@ import { trackTimeline } from "../panels/looks/keyframes";
 import { trackPanelWidths } from "../state/panelWidths";
 import { sessionUser } from "../state/sessionUser";
 import { page } from "../state/scene";
-import { contextPrototype } from "../render/canvasColor";
+import { contextPrototype } from "../render/color/canvasColor";
 import { watchCanvasAbilities } from "../state/canvasColor";
 import { trackName } from "../state/collaboration";
 import { loadComparison } from "../panels/compare/comparison";

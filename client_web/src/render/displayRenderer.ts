@@ -1,5 +1,5 @@
 /** WebGL2 rendering of the image. All its data is also on the CPU, so a lost context only costs a redraw. */
-import { configureCanvas, contextPrototype, hasHdrCanvas, type CanvasColor } from "./canvasColor";
+import { configureCanvas, contextPrototype, hasHdrCanvas, type CanvasColor } from "./color/canvasColor";
 import { lutSize, type LutTable } from "./color/lutTable";
 import type { DifferenceMode } from "./color/difference";
 import type { DisplayTransform } from "./color/tonemap";

@@ -4,7 +4,7 @@
  * times as fast without them. */
 
 import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
-import type { CanvasColor } from "./canvasColor";
+import type { CanvasColor } from "./color/canvasColor";
 import { MIDDLE_GRAY } from "./color/contrast";
 import { BLACK, LMS_TO_ITP, PQ, RANGES, RGB_TO_LMS, SCALES, type DifferenceMode } from "./color/difference";
 import { REC709_TO_P3 } from "./color/displayP3";

@@ -7,7 +7,7 @@ import {
   WIDE_GAMUT_QUERY,
   type CanvasAbilities,
   type CanvasColor,
-} from "../render/canvasColor";
+} from "../render/color/canvasColor";
 
 const COLOR_KEY = "relume.canvasColor";
 
