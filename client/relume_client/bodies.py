@@ -176,13 +176,14 @@ class DiscLook(TypedDict):
 
 
 class DisplayLook(TypedDict):
-    """Conversion from radiance to display: white balance, `exposure` in stops, then the tone map or an OpenColorIO
-    view, then a LUT of display values."""
+    """Conversion from radiance to display: white balance, `exposure` in stops, then `contrast`, then the tone map or an
+    OpenColorIO view, then a LUT of display values."""
 
     exposure: NotRequired[float]
     tone_map: NotRequired[Literal["agx", "filmic", "none"] | OcioView]
     temperature: NotRequired[float]
     tint: NotRequired[float]
+    contrast: NotRequired[float]
     lut: NotRequired[str | None]
 
 

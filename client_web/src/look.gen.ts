@@ -35,12 +35,13 @@ export interface DiscLook {
   radius: number;
 }
 
-/** Conversion from radiance to display: white balance, `exposure` in stops, then the tone map or an OpenColorIO view, then a LUT of display values. `temperature`: of the light that shows as white, kelvin; 6500 leaves colors unchanged. `tint`: a positive one takes green out. `lut`: "lut:<id>" of an uploaded LUT; null: none. */
+/** Conversion from radiance to display: white balance, `exposure` in stops, then `contrast`, then the tone map or an OpenColorIO view, then a LUT of display values. `temperature`: of the light that shows as white, kelvin; 6500 leaves colors unchanged. `tint`: a positive one takes green out. `contrast`: slope of log radiance about middle gray; 1 leaves it unchanged. `lut`: "lut:<id>" of an uploaded LUT; null: none. */
 export interface DisplayLook {
   exposure: number;
   tone_map: "agx" | "filmic" | "none" | OcioView;
   temperature: number;
   tint: number;
+  contrast: number;
   lut: string | null;
 }
 
@@ -288,7 +289,7 @@ export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "trans
   environment: { map: null, intensity: 1, color: [1, 1, 1], rotation: 0, link: null },
   background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   transport: { show: "all", bounces: 24 },
-  display: { exposure: 0, tone_map: "agx", temperature: 6500, tint: 0, lut: null },
+  display: { exposure: 0, tone_map: "agx", temperature: 6500, tint: 0, contrast: 1, lut: null },
 };
 
 /** Ranges of the numbers of each field. */
@@ -296,7 +297,7 @@ export const RANGES = {
   environment: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, rotation: { minimum: -360, maximum: 360 } },
   background: { color: { minimum: 0, maximum: 10000 }, blur: { minimum: 2, maximum: 60 } },
   transport: { bounces: { minimum: 0, maximum: 24 } },
-  display: { exposure: { minimum: -20, maximum: 20 }, temperature: { minimum: 2800, maximum: 15000 }, tint: { minimum: -50, maximum: 50 } },
+  display: { exposure: { minimum: -20, maximum: 20 }, temperature: { minimum: 2800, maximum: 15000 }, tint: { minimum: -50, maximum: 50 }, contrast: { minimum: 0.5, maximum: 2 } },
   light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000000000 }, position: { minimum: -1000000000, maximum: 1000000000 }, direction: { minimum: -1000000000, maximum: 1000000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 1e-08, maximum: 100000000 }, radius: { minimum: 0.0001, maximum: 10000 }, length: { minimum: 0.0001, maximum: 10000 }, angle: { minimum: 0, maximum: 30 }, cone: { minimum: 0, maximum: 90 } },
   glass: { color: { minimum: 0, maximum: 1 }, absorption: { minimum: 0, maximum: 1000000 }, roughness: { minimum: 0, maximum: 1 }, ior: { minimum: 1, maximum: 4 } },
   principled: { base_color: { minimum: 0, maximum: 1 }, metallic: { minimum: 0, maximum: 1 }, roughness: { minimum: 0.01, maximum: 1 }, specular: { minimum: 0, maximum: 1 }, specular_color: { minimum: 0, maximum: 10 }, ior: { minimum: 1, maximum: 4 }, anisotropy: { minimum: 0, maximum: 1 }, coat_weight: { minimum: 0, maximum: 1 }, coat_roughness: { minimum: 0.01, maximum: 1 }, sheen_weight: { minimum: 0, maximum: 1 }, sheen_color: { minimum: 0, maximum: 1 }, sheen_roughness: { minimum: 0.07, maximum: 1 }, transmission: { minimum: 0, maximum: 1 } },

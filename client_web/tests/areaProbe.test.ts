@@ -6,7 +6,7 @@ import { srgbEncode } from "../src/render/color/tonemap";
 import { displayMatrix } from "../src/render/color/whiteBalance";
 import { areaBetween, MAX_AREA_SIDE, middleArea, steppedArea } from "../src/state/areaProbe";
 
-const transform = { matrix: displayMatrix(1, 6500, 0), toneMap: "none", lut: null } as const;
+const transform = { matrix: displayMatrix(1, 6500, 0), contrast: 1, toneMap: "none", lut: null } as const;
 
 test("rectangles include both pixels, stay inside, and are limited", () => {
   expect(areaBetween([6, 2], [3, 4], [10, 10])).toEqual({ x: 3, y: 2, width: 4, height: 3 });

@@ -8,7 +8,7 @@ import { fragmentShader } from "../src/render/displayShaders";
 import { differenceText } from "../src/viewport/DifferenceLegend";
 import type { Rgb } from "../src/protocol";
 
-const transform = { matrix: displayMatrix(0, 6500, 0), toneMap: "none", lut: null } as const;
+const transform = { matrix: displayMatrix(0, 6500, 0), contrast: 1, toneMap: "none", lut: null } as const;
 
 // computed with NumPy from the matrices of ITU-R BT.2100 and BT.2087, and the PQ curve
 test.each<[Rgb, Rgb, number]>([
@@ -48,6 +48,7 @@ test("the shader of a plain image has no difference in it", () => {
   const features = {
     toneMap: "agx",
     falseColor: false,
+    contrast: false,
     lut: false,
     isMinified: false,
     displayReferred: false,
@@ -57,6 +58,7 @@ test("the shader of a plain image has no difference in it", () => {
     brush: false,
     outline: false,
     solo: false,
+    canvasColor: "srgb",
   } as const;
   expect(fragmentShader({ ...features, difference: "off" })).not.toContain("#define DIFFERENCE");
   expect(fragmentShader({ ...features, difference: "delta_e" })).toContain("#define DIFFERENCE_DELTA_E");

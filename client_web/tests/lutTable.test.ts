@@ -44,9 +44,9 @@ test.each<Rgb>([
 });
 
 test("exposure comes before a view, and what is below nothing is black", () => {
-  expect(toDisplay([0.5, 0.1, 2], { matrix: displayMatrix(1, 6500, 0), toneMap: MIXED, lut: null })).toEqual(
-    sampleLut(MIXED, [1, 0.2, 4]),
-  );
+  expect(
+    toDisplay([0.5, 0.1, 2], { matrix: displayMatrix(1, 6500, 0), contrast: 1, toneMap: MIXED, lut: null }),
+  ).toEqual(sampleLut(MIXED, [1, 0.2, 4]));
   expect(sampleLut(MIXED, [-1, -2, -3])).toEqual(sampleLut(MIXED, [0, 0, 0]));
 });
 
@@ -58,7 +58,7 @@ test("a display LUT has its own size, is linear between its nodes, and follows t
   const [r, g, b] = sampleDisplayLut(table, [0.2, 0.7, 0.4]);
   expect([r, g, b].map((v) => Number(v.toFixed(6)))).toEqual([0.8, 0.7, 0.2]);
   expect(sampleDisplayLut(table, [-1, 2, 1])).toEqual([1, 1, 0.5]);
-  const transform = { matrix: displayMatrix(0, 6500, 0), toneMap: "none", lut: null } as const;
+  const transform = { matrix: displayMatrix(0, 6500, 0), contrast: 1, toneMap: "none", lut: null } as const;
   const plain = toDisplay([0.1, 0.2, 0.3], transform);
   toDisplay([0.1, 0.2, 0.3], { ...transform, lut: table }).forEach((v, c) =>
     expect(v).toBeCloseTo([1 - plain[0], plain[1], plain[2] / 2][c] as number, 6),

@@ -6,7 +6,7 @@ import { displayMatrix } from "../src/render/color/whiteBalance";
 import { computeWaveform, summarizeWaveform } from "../src/render/waveform";
 
 const LEVELS = 101;
-const transform = { matrix: displayMatrix(1, 6500, 0), toneMap: "none", lut: null } as const;
+const transform = { matrix: displayMatrix(1, 6500, 0), contrast: 1, toneMap: "none", lut: null } as const;
 const level = (linear: number) => Math.round(srgbEncode(2 * linear) * (LEVELS - 1));
 
 /** Left half red, right half a gray. */

@@ -1,4 +1,4 @@
-"""Conversion of linear radiance to display values: white balance, exposure, tone map or view, and a display LUT."""
+"""Conversion of linear radiance to display values: white balance, exposure, contrast, tone map or view, and a LUT."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.image_io.contrast import NEUTRAL_CONTRAST, apply_contrast
 from relume.image_io.ocio.view import OcioView
 from relume.image_io.tone_mapping import MAX_RADIANCE, tone_map
 from relume.image_io.white_balance import NEUTRAL_TEMPERATURE, balance_matrix
@@ -23,6 +24,7 @@ class DisplayTransform:
         exposure: stops. tone_map: one of TONE_MAPS, or a view of the active OpenColorIO config.
         temperature, tint: the light that shows as white, as in `balance_matrix`.
         lut: display values by display values, as from `read_cube`; None: no LUT.
+        contrast: as in `apply_contrast`.
     """
 
     exposure: float = 0.0
@@ -30,6 +32,12 @@ class DisplayTransform:
     temperature: float = NEUTRAL_TEMPERATURE
     tint: float = 0.0
     lut: Shaped[NDArray[np.uint16], "N N N 3"] | None = None
+    contrast: float = NEUTRAL_CONTRAST
+
+    @property
+    def is_graded(self) -> bool:
+        """True if white balance or contrast change the image."""
+        return (self.temperature, self.tint, self.contrast) != (NEUTRAL_TEMPERATURE, 0.0, NEUTRAL_CONTRAST)
 
 
 def to_display(
@@ -43,9 +51,9 @@ def to_display(
     Raises:
         ParameterError, ShapeMismatchError: as `tone_map` does.
     """
-    is_neutral = (transform.temperature, transform.tint) == (NEUTRAL_TEMPERATURE, 0.0)
-    balanced = image if is_neutral else _balanced(image, transform)
-    display = tone_map(balanced, transform.exposure, transform.tone_map, use_table=use_table)
+    graded = _graded(image, transform) if transform.is_graded else image
+    # exposure is before contrast
+    display = tone_map(graded, transform.contrast * transform.exposure, transform.tone_map, use_table=use_table)
     if transform.lut is not None:
         from relume.image_io.ocio.sampling import apply_display_lut  # compiled
 
@@ -53,6 +61,11 @@ def to_display(
     return display
 
 
-def _balanced(image: F32, transform: DisplayTransform) -> F32:
+def _graded(image: F32, transform: DisplayTransform) -> F32:
     matrix = balance_matrix(transform.temperature, transform.tint).astype(np.float32)
-    return np.asarray(np.clip(np.nan_to_num(image, nan=0.0), 0, MAX_RADIANCE) @ matrix.T)
+    balanced = np.clip(np.nan_to_num(image, nan=0.0), 0, MAX_RADIANCE) @ matrix.T
+    return (
+        balanced
+        if transform.contrast == NEUTRAL_CONTRAST
+        else apply_contrast(np.maximum(balanced, 0), transform.contrast)
+    )

@@ -11,6 +11,7 @@ from PIL import Image
 
 from relume.core.color import luminance
 from relume.core.errors import SceneError
+from relume.image_io.contrast import apply_contrast
 from relume.image_io.decode import MAX_SIDE, Decoder
 from relume.image_io.inverse_tone_mapping import inverse_tone_map
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
@@ -27,9 +28,9 @@ _LABEL = "the reference picture"
 def read_reference(data: bytes, display: DisplayLook, size: tuple[int, int]) -> Target:
     """Decode a reference picture as a target.
 
-    HDR and OpenEXR files have linear radiance. Other files have display values, from which tone map, exposure and white
-    balance of the look are removed; an OpenColorIO view counts as sRGB, and a display LUT stays. Clipped, transparent
-    and invalid pixels have no weight.
+    HDR and OpenEXR files have linear radiance. Other files have display values, from which tone map, contrast, exposure
+    and white balance of the look are removed; an OpenColorIO view counts as sRGB, and a display LUT stays. Clipped,
+    transparent and invalid pixels have no weight.
 
     Args:
         data: contents of the file. display: of the look. size: width and height of the target; a picture of another
@@ -43,7 +44,9 @@ def read_reference(data: bytes, display: DisplayLook, size: tuple[int, int]) -> 
         return _resize(radiance, np.asarray(np.isfinite(radiance).all(axis=-1), np.float32), size)
     pixels = Decoder().decode(data, _LABEL)
     tone_map = display.tone_map if isinstance(display.tone_map, str) else "none"
-    balanced = inverse_tone_map(np.asarray(pixels[..., :3] / 255, np.float32), display.exposure, tone_map)
+    values = np.asarray(pixels[..., :3] / 255, np.float32)
+    graded = inverse_tone_map(values, display.contrast * display.exposure, tone_map)
+    balanced = apply_contrast(graded, 1 / display.contrast)
     unbalance = np.linalg.inv(balance_matrix(display.temperature, display.tint)).astype(np.float32)
     radiance = np.maximum(balanced @ unbalance.T, 0)
     is_clipped = (pixels[..., :3] == _WHITE).any(axis=-1)

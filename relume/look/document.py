@@ -18,6 +18,7 @@ from relume.core.validation import (
     invalid_value,
     names_text,
 )
+from relume.image_io.contrast import CONTRASTS, NEUTRAL_CONTRAST
 from relume.image_io.ocio.view import MAX_NAME
 from relume.image_io.white_balance import NEUTRAL_TEMPERATURE, TEMPERATURES, TINTS
 from relume.look.glass import complete_glass, default_glass
@@ -36,7 +37,7 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number in a fie
     "environment": {"intensity": (0.0, MAX_INTENSITY), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
     "background": {"color": (0.0, MAX_COLOR), "blur": (2.0, 60.0)},
     "transport": {"bounces": (0, MAX_BOUNCES)},
-    "display": {"exposure": (-20.0, 20.0), "temperature": TEMPERATURES, "tint": TINTS},
+    "display": {"exposure": (-20.0, 20.0), "temperature": TEMPERATURES, "tint": TINTS, "contrast": CONTRASTS},
 }
 DEFAULTS: dict[str, dict[str, Any]] = {
     "environment": {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0, "link": None},
@@ -47,6 +48,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "tone_map": "agx",
         "temperature": NEUTRAL_TEMPERATURE,
         "tint": 0.0,
+        "contrast": NEUTRAL_CONTRAST,
         "lut": None,
     },
 }
@@ -233,7 +235,7 @@ def _complete_transport(partial: Any, default: Mapping[str, Any]) -> dict[str, A
 
 
 def _complete_display(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
-    fields = _merge(("display",), partial, {**DEFAULTS["display"], **default})  # older stores have no white balance
+    fields = _merge(("display",), partial, {**DEFAULTS["display"], **default})  # older stores have fewer
     for name, allowed in RANGES["display"].items():
         check_number(("display", name), fields[name], *allowed)
     _check_tone_map(("display", "tone_map"), fields["tone_map"])

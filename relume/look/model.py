@@ -415,24 +415,26 @@ class TransportLook(_FrozenModel):
 
 
 class DisplayLook(_FrozenModel):
-    """Conversion from radiance to display: white balance, `exposure` in stops, then the tone map or an OpenColorIO
-    view, then a LUT of display values.
+    """Conversion from radiance to display: white balance, `exposure` in stops, then `contrast`, then the tone map
+    or an OpenColorIO view, then a LUT of display values.
 
     `temperature`: of the light that shows as white, kelvin; 6500 leaves colors unchanged. `tint`: a positive one takes
-    green out. `lut`: "lut:<id>" of an uploaded LUT; null: none.
+    green out. `contrast`: slope of log radiance about middle gray; 1 leaves it unchanged. `lut`: "lut:<id>" of an
+    uploaded LUT; null: none.
     """
 
     exposure: float
     tone_map: ToneMap | OcioView
     temperature: float
     tint: float
+    contrast: float
     lut: str | None
 
     @property
     def transform(self) -> DisplayTransform:
         """The conversion of images. Raises NotFoundError if the LUT was deleted."""
         table = None if self.lut is None else load_table(self.lut)
-        return DisplayTransform(self.exposure, self.tone_map, self.temperature, self.tint, table)
+        return DisplayTransform(self.exposure, self.tone_map, self.temperature, self.tint, table, self.contrast)
 
 
 class BackgroundLook(_FrozenModel):

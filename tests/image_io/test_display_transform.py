@@ -1,10 +1,11 @@
-"""White balance against colors with known whites, and its order with exposure, tone map and LUT."""
+"""White balance against colors with known whites, contrast, and their order with exposure, tone map and LUT."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from relume.image_io.contrast import CONTRASTS, apply_contrast
 from relume.image_io.display_transform import DisplayTransform, to_display
 from relume.image_io.tone_mapping import TONE_MAPS, tone_map
 from relume.image_io.white_balance import TEMPERATURES, TINTS, balance_matrix
@@ -45,6 +46,33 @@ def test_gains_are_finite_over_the_whole_range(temperature, tint):
     assert np.linalg.det(matrix) > 0
 
 
+@pytest.mark.parametrize(
+    ("contrast", "radiance", "expected"),  # client_web/tests/contrast.test.ts has the same numbers
+    [
+        (1.0, 0.7, 0.7),
+        (2.0, 0.18, 0.18),
+        (2.0, 0.36, 0.72),
+        (0.5, 0.72, 0.36),
+        (1.4, 1.0, 1.985596),
+        (0.7, 0.01, 0.0238003),
+    ],
+)
+def test_contrast_is_a_slope_about_middle_gray(contrast, radiance, expected):
+    contrasted = apply_contrast(np.float32([radiance]), contrast)
+    np.testing.assert_allclose(contrasted, expected, rtol=1e-5)
+    np.testing.assert_allclose(apply_contrast(contrasted, 1 / contrast), radiance, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", TONE_MAPS)
+@pytest.mark.parametrize("contrast", CONTRASTS)
+def test_contrast_is_after_exposure_and_before_the_tone_map(name, contrast):
+    image = np.random.default_rng(3).random((6, 7, 3)).astype(np.float32)
+    exposed = 2**0.7 * np.maximum(image @ balance_matrix(4200.0, 12.0).T, 0)
+    display = to_display(image, DisplayTransform(0.7, name, 4200.0, 12.0, contrast=contrast))
+    expected = tone_map((0.18 * (exposed / 0.18) ** contrast).astype(np.float32), 0.0, name)
+    np.testing.assert_allclose(display, expected, atol=1e-5)
+
+
 @pytest.mark.parametrize("name", TONE_MAPS)
 def test_white_balance_is_before_the_tone_map(name):
     image = np.random.default_rng(1).random((6, 7, 3)).astype(np.float32)
@@ -54,9 +82,10 @@ def test_white_balance_is_before_the_tone_map(name):
     np.testing.assert_array_equal(to_display(image, DisplayTransform(0.7, name)), tone_map(image, 0.7, name))
 
 
-def test_invalid_radiance_is_black_in_any_balance():
+@pytest.mark.parametrize("contrast", [1.0, 2.0])
+def test_invalid_radiance_is_black_in_any_balance(contrast):
     image = np.float32([[[np.nan, 0.2, 0.2], [np.inf] * 3, [-1, -1, -1]]])
-    display = to_display(image, DisplayTransform(0.0, "none", 3200.0))[0]
+    display = to_display(image, DisplayTransform(0.0, "none", 3200.0, contrast=contrast))[0]
     assert np.isfinite(display).all()
     assert display[0].min() == 0  # of red alone
     np.testing.assert_allclose(display[1], 1, atol=1e-6)

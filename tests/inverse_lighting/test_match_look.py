@@ -142,9 +142,12 @@ def test_clipped_and_transparent_pixels_have_no_weight(gathered):
     np.testing.assert_allclose(target.radiance[2, 2], 0.21586 / 2**0.5, rtol=1e-3)
 
 
-def test_white_balance_of_the_display_is_removed(gathered):
-    display = look_of(gathered).display.model_copy(update={"temperature": 3200.0, "tint": 12.0})
-    transform = DisplayTransform(display.exposure, "agx", display.temperature, display.tint)
+@pytest.mark.parametrize("contrast", [1.0, 1.3])
+def test_white_balance_and_contrast_of_the_display_are_removed(gathered, contrast):
+    display = look_of(gathered).display.model_copy(
+        update={"exposure": 0.4, "temperature": 3200.0, "tint": 12.0, "contrast": contrast}
+    )
+    transform = DisplayTransform(0.4, "agx", 3200.0, 12.0, contrast=contrast)
     radiance = np.broadcast_to(np.array([0.3, 0.2, 0.12], np.float32), (4, 4, 3))
     shown = to_bytes(to_display(radiance, transform))
     target = read_reference(png_bytes(shown), display, (4, 4))

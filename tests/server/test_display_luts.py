@@ -58,6 +58,8 @@ def test_renders_have_the_white_balance_and_the_lut(client: TestClient, render: 
     assert np.ptp(expected, axis=-1).min() > 0.1
     balanced = render({"temperature": 5200.0, "tint": 10.0}) / 255
     np.testing.assert_allclose(decoded(balanced), expected, atol=0.01)  # two roundings to 8 bits
+    steeper = np.clip(decoded(plain) ** 2 / 0.18, 0, 1)
+    np.testing.assert_allclose(decoded(render({"contrast": 2.0}) / 255), steeper, atol=0.02)
 
 
 def decoded(display: np.ndarray) -> np.ndarray:
@@ -73,6 +75,7 @@ def decoded(display: np.ndarray) -> np.ndarray:
         ({"temperature": 100.0}, "/display/temperature"),
         ({"temperature": "warm"}, "/display/temperature"),
         ({"tint": 1000.0}, "/display/tint"),
+        ({"contrast": 0.0}, "/display/contrast"),
     ],
 )
 def test_invalid_settings_are_rejected_where_they_are(

@@ -1,4 +1,4 @@
-/** White balance and the display LUT of the look, and the difference of A and B. */
+/** White balance, contrast and the display LUT of the look, and the difference of A and B; color of the screen. */
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { editValue } from "../edit/edit";
 import { DEFAULTS, RANGES } from "../look.gen";
@@ -13,7 +13,9 @@ import {
   LUT_SUFFIX,
   offerToDeleteLut,
 } from "../panels/looks/displayLuts";
+import { whyUnavailable, type CanvasColor } from "../render/color/canvasColor";
 import type { DifferenceMode } from "../render/color/difference";
+import { canvasAbilities, canvasColor, canvasColorChoice, chooseCanvasColor } from "../state/canvasColor";
 import { difference, isPickingGray } from "../state/display";
 import { look } from "../state/look";
 import { LabeledSlider } from "../ui/LabeledSlider";
@@ -50,6 +52,20 @@ function WhiteBalance() {
         {isPickingGray.value ? "Click a gray surface…" : "Pick gray"}
       </button>
     </>
+  );
+}
+
+function Contrast() {
+  return (
+    <LabeledSlider
+      label="Contrast"
+      title="Steepness about middle gray, before the tone map"
+      value={(look.value?.display ?? DEFAULTS.display).contrast}
+      initial={DEFAULTS.display.contrast}
+      {...RANGES.display.contrast}
+      scale="log"
+      onChange={(value) => editValue("Contrast", "/display/contrast", value)}
+    />
   );
 }
 
@@ -116,6 +132,40 @@ function DifferenceSelect() {
   );
 }
 
+const SCREEN_COLORS: { color: CanvasColor; label: string }[] = [
+  { color: "srgb", label: "Standard (sRGB)" },
+  { color: "display-p3", label: "Display P3" },
+  { color: "hdr", label: "HDR" },
+];
+
+function ScreenSelect() {
+  const missing = SCREEN_COLORS.map(({ color }) => whyUnavailable(color, canvasAbilities.value));
+  const { tone_map, lut } = look.value?.display ?? DEFAULTS.display;
+  const isBounded = tone_map !== "none" || lut !== null;
+  return (
+    <>
+      <label>
+        Screen
+        <select
+          title="Colors of the canvas in this browser; not saved with the look"
+          value={canvasColor.value}
+          onChange={(event) => chooseCanvasColor(event.currentTarget.value as CanvasColor)}
+        >
+          {SCREEN_COLORS.map(({ color, label }, index) => (
+            <option key={color} value={color} disabled={missing[index] !== null}>
+              {label}
+            </option>
+          ))}
+        </select>
+      </label>
+      {missing.map((reason) => reason !== null && <p key={reason}>{reason}</p>)}
+      {canvasColorChoice.value === "hdr" && isBounded && (
+        <p>Tone mapping “None” without a LUT shows light brighter than white; the others end at white.</p>
+      )}
+    </>
+  );
+}
+
 export function DisplayMenu() {
   const [open, setOpen] = useState(false);
   const menu = useRef<HTMLDivElement>(null);
@@ -136,8 +186,10 @@ export function DisplayMenu() {
       {open && (
         <div class="menu-body display-menu" role="group" aria-label="Display options">
           <WhiteBalance />
+          <Contrast />
           <LutSelect />
           <DifferenceSelect />
+          <ScreenSelect />
         </div>
       )}
     </div>

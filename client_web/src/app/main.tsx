@@ -16,6 +16,8 @@ import { trackTimeline } from "../panels/looks/keyframes";
 import { trackPanelWidths } from "../state/panelWidths";
 import { sessionUser } from "../state/sessionUser";
 import { page } from "../state/scene";
+import { contextPrototype } from "../render/color/canvasColor";
+import { watchCanvasAbilities } from "../state/canvasColor";
 import { trackName } from "../state/collaboration";
 import { loadComparison } from "../panels/compare/comparison";
 import { trackFocus } from "../ui/restoreFocus";
@@ -60,6 +62,7 @@ async function startApp(): Promise<void> {
 }
 
 function initialize(): void {
+  watchCanvasAbilities(contextPrototype, (query) => matchMedia(query));
   const urlState = parseUrl(location.search, location.hash);
   trackFocus();
   trackNetwork();

@@ -2,6 +2,7 @@
  * only its view. */
 import { effect, signal } from "@preact/signals";
 import { soloMaterial } from "../state/visibility/soloSources";
+import { canvasColor } from "../state/canvasColor";
 import { displayTransform } from "../state/color";
 import { brushedRange } from "../state/curvePreview";
 import { difference, displayedFrames, falseColor, isDisplayFrozen, isReferenceShown, wipe } from "../state/display";
@@ -144,6 +145,7 @@ export class ImageCanvas implements ImagePresenter {
       hover: hovered === null || ids === null ? -1 : materialNames.value.indexOf(hovered),
       solo: soloName === null || ids === null ? -1 : materialNames.value.indexOf(soloName),
       brush: brushedRange.value !== null && brush !== null,
+      canvasColor: canvasColor.value,
     };
   }
 

@@ -1,4 +1,5 @@
 /** WebGL2 rendering of the image. All its data is also on the CPU, so a lost context only costs a redraw. */
+import { configureCanvas, contextPrototype, hasHdrCanvas, type CanvasColor } from "./color/canvasColor";
 import { lutSize, type LutTable } from "./color/lutTable";
 import type { DifferenceMode } from "./color/difference";
 import type { DisplayTransform } from "./color/tonemap";
@@ -28,6 +29,7 @@ export interface DisplayState {
   transparent: boolean;
   transparentReference: boolean;
   surround: [number, number, number];
+  canvasColor: CanvasColor;
 }
 
 export class DisplayRenderer {
@@ -35,11 +37,15 @@ export class DisplayRenderer {
   private programs = new Map<string, Program>();
   private textures!: Record<TextureUnit, WebGLTexture>;
   private size: [number, number] = [1, 1];
+  /** Color and size that the drawing buffer is configured for. */
+  private configured = "";
   /** The tables of the view and of the display LUT, and their textures. */
   private volumes!: { texture: WebGLTexture; table: LutTable | null }[];
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
+    // drawing buffers of another format must have alpha
+    const alpha = hasHdrCanvas(contextPrototype);
+    const gl = canvas.getContext("webgl2", { alpha, antialias: false, depth: false });
     if (gl === null)
       throw new Error(
         "This browser has no WebGL2, which the editor needs. Turn on hardware acceleration or use another browser.",
@@ -52,6 +58,7 @@ export class DisplayRenderer {
   restore(): void {
     const { gl } = this;
     this.programs.clear();
+    this.configured = "";
     this.textures = Object.fromEntries(
       UNITS.map((unit) => [unit, makeTexture(gl, unit === "uIds" ? gl.NEAREST : gl.LINEAR)]),
     ) as Record<TextureUnit, WebGLTexture>;
@@ -138,10 +145,12 @@ export class DisplayRenderer {
   draw(state: DisplayState): void {
     const { gl, canvas } = this;
     if (gl.isContextLost()) return;
+    this.configure(state.canvasColor);
     gl.viewport(0, 0, canvas.width, canvas.height);
-    const { matrix, toneMap, lut } = state.display;
+    const { matrix, contrast, toneMap, lut } = state.display;
     const program = this.use({
       toneMap: typeof toneMap === "string" ? toneMap : "table",
+      contrast: contrast !== 1,
       lut: lut !== null,
       falseColor: state.falseColor,
       isMinified: state.transform[2] < this.size[0],
@@ -153,6 +162,7 @@ export class DisplayRenderer {
       brush: state.brush,
       outline: state.hover >= 0,
       solo: state.solo >= 0,
+      canvasColor: state.canvasColor,
     });
     this.bindTextures(state.transform[2] / this.size[0] >= NEAREST_FROM);
     this.bindVolume(0, typeof toneMap === "string" ? null : toneMap);
@@ -161,11 +171,20 @@ export class DisplayRenderer {
     gl.uniform4f(program.uniform("uImageRect"), ...state.transform);
     gl.uniform2f(program.uniform("uSize"), ...this.size);
     gl.uniformMatrix3fv(program.uniform("uDisplayMatrix"), true, matrix.flat());
+    gl.uniform1f(program.uniform("uContrast"), contrast);
     gl.uniform1f(program.uniform("uWipe"), state.wipe);
     gl.uniform1i(program.uniform("uHover"), state.hover);
     gl.uniform1i(program.uniform("uSolo"), state.solo);
     gl.uniform3f(program.uniform("uSurround"), ...state.surround);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** A resized canvas has a new drawing buffer. */
+  private configure(color: CanvasColor): void {
+    const { width, height } = this.canvas;
+    const configuration = `${color} ${width} ${height}`;
+    if (configuration !== this.configured) configureCanvas(this.gl, color, width, height);
+    this.configured = configuration;
   }
 
   private bindVolume(index: number, table: LutTable | null): void {

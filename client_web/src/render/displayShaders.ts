@@ -4,13 +4,18 @@
  * times as fast without them. */
 
 import { LUT_GAIN, LUT_SIZE, type Rgb } from "../protocol";
+import type { CanvasColor } from "./color/canvasColor";
+import { MIDDLE_GRAY } from "./color/contrast";
 import { BLACK, LMS_TO_ITP, PQ, RANGES, RGB_TO_LMS, SCALES, type DifferenceMode } from "./color/difference";
+import { REC709_TO_P3 } from "./color/displayP3";
 import type { Matrix } from "./color/whiteBalance";
 
 /** Features of a shader variant, compiled when first needed. */
 export interface DisplayFeatures {
   toneMap: "none" | "agx" | "filmic" | "table";
   falseColor: boolean;
+  /** Contrast is not neutral. */
+  contrast: boolean;
   /** A display LUT follows the tone map. */
   lut: boolean;
   /** The image is minified. */
@@ -27,6 +32,7 @@ export interface DisplayFeatures {
   brush: boolean;
   outline: boolean;
   solo: boolean;
+  canvasColor: CanvasColor;
 }
 
 export const VERTEX = `#version 300 es
@@ -34,6 +40,11 @@ void main() {
   vec2 p = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
   gl_Position = vec4(p * 2.0 - 1.0, 0.0, 1.0);
 }`;
+
+/** True if the canvas shows more than display values in [0, 1] of Rec. 709: all tone maps but "none", LUTs and
+ * differences have no others. */
+const isUnbounded = ({ canvasColor, toneMap, falseColor, lut, difference }: DisplayFeatures): boolean =>
+  canvasColor !== "srgb" && toneMap === "none" && !falseColor && !lut && difference === "off";
 
 /** Source of a variant. */
 export function fragmentShader(features: DisplayFeatures): string {
@@ -47,6 +58,7 @@ export function fragmentShader(features: DisplayFeatures): string {
           : features.toneMap === "table"
             ? "TABLE"
             : "PLAIN",
+    features.contrast && !features.falseColor && "CONTRAST",
     features.lut && !features.falseColor && "LUT",
     features.isMinified && "MINIFIED",
     features.displayReferred && "DISPLAY_REFERRED",
@@ -58,6 +70,9 @@ export function fragmentShader(features: DisplayFeatures): string {
     features.brush && "BRUSH",
     features.outline && "OUTLINE",
     features.solo && "SOLO",
+    isUnbounded(features) && "UNBOUNDED",
+    features.canvasColor === "display-p3" && "DISPLAY_P3",
+    features.canvasColor === "hdr" && "HDR",
   ];
   const lines = defines.flatMap((name) => (name ? [`#define ${name}`] : []));
   const table = [`#define GAIN ${LUT_GAIN.toFixed(1)}`, `#define LAST ${(LUT_SIZE - 1).toFixed(1)}`];
@@ -81,8 +96,7 @@ vec3 differenceColor(vec3 a, vec3 b) {
 
 #ifdef DIFFERENCE_DELTA_E
 vec3 itp(vec3 x) {
-  vec3 linear = mix(x / 12.92, pow((x + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), x));
-  vec3 power = pow(max(${mat3Text(RGB_TO_LMS)} * linear, 0.0) / 100.0, vec3(${PQ.m1}));
+  vec3 power = pow(max(${mat3Text(RGB_TO_LMS)} * decoded(x), 0.0) / 100.0, vec3(${PQ.m1}));
   return ${mat3Text(LMS_TO_ITP)} * pow((${PQ.c1} + ${PQ.c2} * power) / (1.0 + ${PQ.c3} * power), vec3(${PQ.m2}));
 }
 
@@ -108,6 +122,7 @@ uniform vec2 uCanvas;          // device pixels
 uniform vec4 uImageRect;           // left, top, width, height of the image, device pixels from the top left
 uniform vec2 uSize;            // size of the image in pixels
 uniform mat3 uDisplayMatrix;   // exposure times white balance
+uniform float uContrast;       // slope of log radiance about middle gray
 uniform float uWipe;           // fraction of the image left of which the A side shows
 uniform int uHover;            // material to outline
 uniform int uSolo;             // solo material
@@ -116,9 +131,27 @@ out vec4 outColor;
 
 const vec3 ACCENT = vec3(0.941, 0.706, 0.235);
 
-vec3 srgb(vec3 x) {
-  x = clamp(x, 0.0, 1.0);
+vec3 encoded(vec3 x) {
   return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), x));
+}
+
+vec3 srgb(vec3 x) {
+  return encoded(clamp(x, 0.0, 1.0));
+}
+
+#if defined(DIFFERENCE_DELTA_E) || defined(DISPLAY_P3)
+vec3 decoded(vec3 x) {
+  return mix(x / 12.92, pow((x + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), x));
+}
+#endif
+
+// display values of Rec. 709, beyond [0, 1] if unbounded, in the color space of the canvas
+vec3 canvasColor(vec3 color) {
+#ifdef DISPLAY_P3
+  return srgb(${mat3Text(REC709_TO_P3)} * (sign(color) * decoded(abs(color))));
+#else
+  return color;
+#endif
 }
 
 vec3 agx(vec3 x) {
@@ -187,19 +220,30 @@ vec3 falseColor(vec3 x) {
 }
 
 vec3 toneMapped(vec3 x) {
+#ifdef CONTRAST
+  x = sign(x) * min(${MIDDLE_GRAY} * pow(abs(x) / ${MIDDLE_GRAY}, vec3(uContrast)), 1e9);  // tone maps square it
+#endif
 #if defined(AGX)
   return agx(x);
 #elif defined(FILMIC)
   return filmic(x);
 #elif defined(TABLE)
   return table(x);
+#elif defined(UNBOUNDED) && defined(HDR)
+  return sign(x) * encoded(abs(x));
+#elif defined(UNBOUNDED)
+  x = min(x, 1.0);
+  return sign(x) * encoded(abs(x));
 #else
   return srgb(x);
 #endif
 }
 
 vec3 display(vec3 x) {
-  x = max(uDisplayMatrix * x, 0.0);
+  x = uDisplayMatrix * x;
+#ifndef UNBOUNDED
+  x = max(x, 0.0);
+#endif
 #if defined(FALSE_COLOR)
   return falseColor(x);
 #elif defined(LUT)
@@ -233,7 +277,7 @@ vec4 sampled(vec2 uv, bool reference) {
 
 // filtered: shared exponents cannot be mipmapped, so four taps across the pixel footprint
 vec4 filtered(vec2 uv, bool reference) {
-#ifdef SHRUNK
+#ifdef MINIFIED
   vec2 d = (uSize / uImageRect.zw - 1.0) * 0.25 / uSize;
   return 0.25 * (sampled(uv + d, reference) + sampled(uv - d, reference)
     + sampled(uv + vec2(d.x, -d.y), reference) + sampled(uv + vec2(-d.x, d.y), reference));
@@ -306,5 +350,5 @@ void main() {
 #ifdef OUTLINE
   if (outlined(uv)) color = ACCENT;
 #endif
-  outColor = vec4(color, 1.0);
+  outColor = vec4(canvasColor(color), 1.0);
 }`;

@@ -4,7 +4,7 @@ import type { LutTable } from "../render/color/lutTable";
 import type { DisplayedToneMap, DisplayTransform } from "../render/color/tonemap";
 import { displayMatrix } from "../render/color/whiteBalance";
 import type { ColorBody, Look, OcioView } from "../protocol";
-import { displayGain } from "./look";
+import { contrast, displayGain } from "./look";
 
 type ToneMap = Look["display"]["tone_map"];
 
@@ -17,6 +17,7 @@ export const displayLut = signal<LutTable | null>(null);
 /** The current display transform. */
 export const displayTransform = computed<DisplayTransform>(() => ({
   matrix: displayGain.value,
+  contrast: contrast.value,
   toneMap: toneMap.value,
   lut: displayLut.value,
 }));
@@ -57,8 +58,16 @@ export const displayLutFor = (name: string | null | undefined): LutTable | null 
   name ? lutTables.value.get(name) : null;
 
 /** The display transform of a look without waiting: falls back to AgX, and to no LUT, while loading. */
-export const transformOf = ({ exposure, temperature, tint, tone_map, lut }: Look["display"]): DisplayTransform => ({
+export const transformOf = ({
+  exposure,
+  temperature,
+  tint,
+  contrast,
+  tone_map,
+  lut,
+}: Look["display"]): DisplayTransform => ({
   matrix: displayMatrix(exposure, temperature, tint),
+  contrast,
   toneMap: lutFor(tone_map) ?? "agx",
   lut: displayLutFor(lut) ?? null,
 });

@@ -13,6 +13,7 @@ export const defaultLook = signal<Look | null>(null);
 export const exposure = computed(() => look.value?.display.exposure ?? 0);
 const temperature = computed(() => look.value?.display.temperature ?? DEFAULTS.display.temperature);
 const tint = computed(() => look.value?.display.tint ?? DEFAULTS.display.tint);
+export const contrast = computed(() => look.value?.display.contrast ?? DEFAULTS.display.contrast);
 /** Exposure times white balance. */
 export const displayGain = computed(() => displayMatrix(exposure.value, temperature.value, tint.value));
 /** True with the environment that the bake was made for; in another one, "exact" means exact for this bake. */

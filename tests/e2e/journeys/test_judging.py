@@ -57,3 +57,16 @@ def test_scopes_area_and_difference_have_numbers(editor: Editor) -> None:
     page.get_by_role("combobox", name="Difference").select_option("delta_e")
     expect(legend).to_contain_text("ΔE ITP")
     page.get_by_role("combobox", name="Difference").select_option("off")
+
+
+def test_contrast_and_a_screen_without_hdr(editor: Editor) -> None:
+    page, before = editor.page, editor.pixels()
+    page.get_by_role("button", name="Display options").click()
+    page.get_by_role("slider", name="Contrast").press("End")
+    assert editor.pixels().std() > 1.2 * before.std()
+    page.get_by_role("slider", name="Contrast").press("Delete")
+    screen = page.get_by_role("combobox", name="Screen")
+    expect(screen).to_have_value("srgb")
+    expect(screen.locator("option[value=hdr]")).to_be_disabled()
+    expect(page.get_by_role("group", name="Display options")).to_contain_text("HDR needs")
+    np.testing.assert_allclose(editor.pixels(), before, atol=1)

@@ -1,5 +1,6 @@
 /** Linear Rec. 709 radiance to sRGB-encoded display values in [0, 1], as in the shader, for pixel probe and export. */
 import type { Rgb } from "../../protocol";
+import { withContrast } from "./contrast";
 import { sampleDisplayLut, sampleLut, type LutTable } from "./lutTable";
 import { transformColor, type Matrix } from "./whiteBalance";
 
@@ -16,6 +17,8 @@ export type DisplayedToneMap = (typeof TONE_MAPS)[number]["name"] | LutTable;
 export interface DisplayTransform {
   /** Exposure times white balance, for linear Rec. 709. */
   matrix: Matrix;
+  /** Slope of log radiance about middle gray. */
+  contrast: number;
   toneMap: DisplayedToneMap;
   /** Display LUT after the tone map. */
   lut: LutTable | null;
@@ -69,18 +72,18 @@ function filmic(x: number): number {
   return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-/** Display values of a radiance: white balance and exposure, then tone map and sRGB curve or a view, then a LUT. */
-export function toDisplay(radiance: Rgb, { matrix, toneMap, lut }: DisplayTransform): Rgb {
-  const exposed = transformColor(matrix, radiance).map((v) => Math.max(0, v)) as Rgb;
-  const display = applyToneMap(exposed, toneMap);
+/** Display values of a radiance: white balance and exposure, contrast, tone map and sRGB curve or a view, a LUT. */
+export function toDisplay(radiance: Rgb, { matrix, contrast, toneMap, lut }: DisplayTransform): Rgb {
+  const graded = transformColor(matrix, radiance).map((v) => withContrast(Math.max(0, v), contrast)) as Rgb;
+  const display = applyToneMap(graded, toneMap);
   return lut === null ? display : sampleDisplayLut(lut, display);
 }
 
-function applyToneMap(exposed: Rgb, toneMap: DisplayedToneMap): Rgb {
-  if (typeof toneMap !== "string") return sampleLut(toneMap, exposed);
-  if (toneMap === "agx") return agx(exposed);
-  if (toneMap === "filmic") return exposed.map((v) => srgbEncode(filmic(v))) as Rgb;
-  return exposed.map(srgbEncode) as Rgb;
+function applyToneMap(graded: Rgb, toneMap: DisplayedToneMap): Rgb {
+  if (typeof toneMap !== "string") return sampleLut(toneMap, graded);
+  if (toneMap === "agx") return agx(graded);
+  if (toneMap === "filmic") return graded.map((v) => srgbEncode(filmic(v))) as Rgb;
+  return graded.map(srgbEncode) as Rgb;
 }
 
 export function luminance([r, g, b]: Rgb): number {
