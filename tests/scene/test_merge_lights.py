@@ -159,11 +159,11 @@ def test_a_dim_emissive_material_still_shines() -> None:
 
 
 def test_directional_lights_are_one_source_with_their_angles() -> None:
-    suns = [
+    directionals = [
         (f"Sun {chr(65 + k % 26)}{k}x", {"kind": "directional", "direction": [k, -1, 0], "angle": k / 100}, [1 + k] * 3)
         for k in range(70)
     ]
-    lights, warnings = collected(suns)
+    lights, warnings = collected(directionals)
     assert len(lights) == MAX_LIGHTS
     source = lights[-1]
     assert source.fields == {"kind": "directionals", "source": "Other lights", "emission": pytest.approx([4.0] * 3)}

@@ -39,7 +39,7 @@ PANELS = [
     {"kind": "sphere", "position": [0, 1.2, -0.5], "radius": 0.1},
     {"kind": "tube", "position": [0, 1.2, 0.4], "direction": [1, 0, 0], "radius": 0.02, "length": 0.8},
 ]
-SUNS = [
+DIRECTIONALS = [
     {"kind": "directional", "direction": [0.5, -1, 0], "angle": 0.0},
     {"kind": "directional", "direction": [-0.5, -1, 0.3], "angle": 4.0},
 ]
@@ -53,7 +53,7 @@ LIGHTS = {
         "Source",
         {"kind": "directionals", "source": "Source", "emission": [3.0, 2.0, 1.0]},
         "",
-        members_of(SUNS, [0.5, 1.5]),
+        members_of(DIRECTIONALS, [0.5, 1.5]),
     ),
 }
 

@@ -28,7 +28,7 @@ const SCENE_LABELS: Record<Exclude<LightKind, AddedKind>, string> = {
   mesh: "Emissive mesh",
   points: "Many lights",
   panels: "Many area lights",
-  directionals: "Many suns",
+  directionals: "Many sun lights",
   surfaces: "Emissive meshes",
 };
 
