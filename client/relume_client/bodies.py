@@ -160,6 +160,19 @@ class DirectionalLook(TypedDict):
     angle: NotRequired[float]
 
 
+class DirectionalsLook(TypedDict):
+    """Many directional lights of the scene as one source, its `source`; emission is their mean irradiance."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["directionals"]]
+    source: NotRequired[str]
+
+
 class DiscLook(TypedDict):
     """A disc that emits toward `direction`; emission is radiance. The camera does not see it. `radius`: meters."""
 
@@ -364,7 +377,7 @@ class LookDocument(TypedDict):
     materials: NotRequired[Mapping[str, MaterialLook]]
     environment: NotRequired[EnvironmentLook]
     background: NotRequired[BackgroundLook]
-    lights: NotRequired[Mapping[str, PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook | PointsLook | PanelsLook]]
+    lights: NotRequired[Mapping[str, PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook | PointsLook | PanelsLook | DirectionalsLook | SurfacesLook]]
     light_groups: NotRequired[Mapping[str, LightGroupLook]]
     transport: NotRequired[TransportLook]
     display: NotRequired[DisplayLook]
@@ -456,7 +469,7 @@ class OcioView(TypedDict):
 
 
 class PanelsLook(TypedDict):
-    """Many rectangles of the scene as one source, its `source`; emission is their mean radiance."""
+    """Many area lights of the scene as one source, its `source`; emission is their mean radiance by area."""
 
     intensity: NotRequired[float]
     color: NotRequired[Sequence[float]]
@@ -881,6 +894,19 @@ class SurfaceNames(TypedDict):
 
     materials: NotRequired[Sequence[str]]
     objects: NotRequired[Sequence[str]]
+
+
+class SurfacesLook(TypedDict):
+    """All surfaces of several materials of the scene as one source; emission is their mean radiance by area."""
+
+    intensity: NotRequired[float]
+    color: NotRequired[Sequence[float]]
+    enabled: NotRequired[bool]
+    emission: NotRequired[Sequence[float]]
+    link: NotRequired[IncludeLink | ExcludeLink | None]
+    shadow_link: NotRequired[IncludeLink | ExcludeLink | None]
+    kind: NotRequired[Literal["surfaces"]]
+    materials: NotRequired[Sequence[Sequence[str | Sequence[float]]]]
 
 
 class TermLook(TypedDict):

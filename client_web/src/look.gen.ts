@@ -21,6 +21,18 @@ export interface DirectionalLook {
   angle: number;
 }
 
+/** Many directional lights of the scene as one source, its `source`; emission is their mean irradiance. */
+export interface DirectionalsLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "directionals";
+  source: string;
+}
+
 /** A disc that emits toward `direction`; emission is radiance. The camera does not see it. `radius`: meters. */
 export interface DiscLook {
   intensity: number;
@@ -95,7 +107,7 @@ export interface Look {
   materials: Record<string, MaterialLook>;
   environment: EnvironmentLook;
   background: BackgroundLook;
-  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook | PointsLook | PanelsLook>;
+  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | DiscLook | SphereLook | TubeLook | MeshLook | PointsLook | PanelsLook | DirectionalsLook | SurfacesLook>;
   light_groups: Record<string, LightGroupLook>;
   transport: TransportLook;
   display: DisplayLook;
@@ -135,7 +147,7 @@ export interface OcioView {
   view: string;
 }
 
-/** Many rectangles of the scene as one source, its `source`; emission is their mean radiance. */
+/** Many area lights of the scene as one source, its `source`; emission is their mean radiance by area. */
 export interface PanelsLook {
   intensity: number;
   color: [number, number, number];
@@ -225,6 +237,18 @@ export interface SurfaceNames {
   objects?: string[];
 }
 
+/** All surfaces of several materials of the scene as one source; emission is their mean radiance by area. `materials`: each with its radiance over the mean, for each channel. */
+export interface SurfacesLook {
+  intensity: number;
+  color: [number, number, number];
+  enabled: boolean;
+  emission: [number, number, number];
+  link?: IncludeLink | ExcludeLink | null;
+  shadow_link?: IncludeLink | ExcludeLink | null;
+  kind: "surfaces";
+  materials: [string, [number, number, number]][];
+}
+
 /** One term: color · texture · quotient · Π curves. Drawn curves replace those generated from `params`. `data`: name of the measured material, only for models that need one. `roughness_map`: scales the width of the highlight: "roughness" for the material's own map, "image:<id>" for an uploaded one, null for none. `texture`: a texture channel of the material, or an uploaded image. */
 export interface TermLook {
   model: string;
@@ -267,7 +291,9 @@ export type LightLook =
   | TubeLook
   | MeshLook
   | PointsLook
-  | PanelsLook;
+  | PanelsLook
+  | DirectionalsLook
+  | SurfacesLook;
 
 type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { kind: K }> };
 
@@ -283,6 +309,8 @@ export const DEFAULT_LIGHTS: LightsByKind = {
   mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, material: "", image: null },
   points: { kind: "points", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
   panels: { kind: "panels", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
+  directionals: { kind: "directionals", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, source: "" },
+  surfaces: { kind: "surfaces", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], link: null, shadow_link: null, materials: [] },
 };
 
 export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "transport" | "display">> = {

@@ -21,6 +21,7 @@ from relume.images.image_store import load_normal_map, load_roughness_map, load_
 from relume.look import Look, MaterialLook
 from relume.look.glass import with_glass_look
 from relume.look.model import MeshLook
+from relume.look.single_lights import single_lights
 from relume.scene.model import Glass, Material, Scene, Texture
 from relume.scene.texture_encoding import decode
 from relume.scene.triplanar import find_triplanar
@@ -83,7 +84,9 @@ class MaterialExporter:
         Raises:
             NotFoundError: an image or measured data of the look do not exist. SceneError: they are damaged.
         """
-        lights = {light.material: light for light in look.lights.values() if isinstance(light, MeshLook)}
+        lights = {
+            light.material: light for light in single_lights(self._scene, look).values() if isinstance(light, MeshLook)
+        }
         return [self._material(k, look, lights.get(material.name)) for k, material in enumerate(self._scene.materials)]
 
     def _material(self, index: int, look: Look, light: MeshLook | None) -> ExportMaterial:

@@ -35,7 +35,7 @@ from relume.lights.light_sampling import (
     split_axes,
     subdivide_emitter,
 )
-from relume.lights.shape_triangles import LightTriangles, shape_triangles
+from relume.lights.shape_triangles import LightTriangles, shape_triangles, sun_triangles
 from relume.look import LightGeometry
 from relume.math.plane_rounding import end_offsets
 
@@ -49,9 +49,11 @@ _INFINITE = np.float32(np.inf)
 _SEED = 1
 # most samples of a mesh, and of many lights, face away from a point, or are far from it; half of those of a sphere and
 # a tube face away
-_SAMPLE_FACTORS = {"rectangle": 1, "disc": 1, "sphere": 4, "tube": 4, "mesh": 4, "panels": 4, "points": 4}
 _PI, _TWO_PI = np.float32(math.pi), np.float32(2 * math.pi)
 UNIFORM_INTENSITY = np.ones((1, 1), np.float32)
+_SAMPLE_FACTORS = {"rectangle": 1, "disc": 1, "sphere": 4, "tube": 4, "mesh": 4}
+_SOURCE_FACTOR = 4  # of many lights
+_MIN_SUN_ANGLE = 0.05  # degrees, of parallel light in a source of many: a tenth of the sun
 _MIN_CONE_COSINES = 1e-3  # difference of cosines, as in KHR_lights_punctual
 
 
@@ -114,7 +116,7 @@ def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
 def _sample_factor(geometry: LightGeometry) -> int:
     if geometry.kind == "directional":
         return int(geometry.angle > 0)
-    return _SAMPLE_FACTORS.get(geometry.kind, 0)
+    return _SOURCE_FACTOR if geometry.is_source else _SAMPLE_FACTORS.get(geometry.kind, 0)
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
@@ -146,8 +148,8 @@ def prepare_local_lights(
 
     Args:
         geometry: the light.
-        triangles: of a light of kind "mesh" or "panels", which without area emits nothing; or of a sun disk, from
-            `sun_triangles`.
+        triangles: of a mesh or a source of many lights with surfaces, which without area emits nothing; or of a sun
+            disk, from `sun_triangles`.
         points: the lights of kind "points".
         intensity_table: of a point or a spot, from `relume.raytrace.intensity_table`.
     """
@@ -159,7 +161,7 @@ def prepare_local_lights(
     if triangles is not None:
         areas = areas * triangles.relative_radiance
     pieces, area = np.flatnonzero(areas > 0), areas.sum()
-    if geometry.kind in ("mesh", "panels"):
+    if geometry.kind == "mesh" or geometry.is_source:
         pieces = pieces[morton_order((corner + edges.sum(axis=1) / 3)[pieces])]
     piece_normals = piece_normals[pieces] / np.linalg.norm(piece_normals[pieces], axis=1, keepdims=True)
     return LocalLight(
@@ -239,15 +241,31 @@ def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, " 3"], Shaped[F64, "
     return np.array(geometry.position, np.float64) - edges.sum(axis=0) / 2, edges
 
 
-def panel_triangles(panels: Sequence[Mapping[str, Any]]) -> LightTriangles:
-    """Return rectangles as triangles, two each. panels: fields as in a look, with an emission of one channel"""
-    corners = []
-    for panel in panels:
-        shape = {field: panel[field] for field in ("kind", "position", "direction", "rotation", "size")}
-        corner, (e, f) = rectangle(LightGeometry(**shape))
-        corners += [(corner, corner + e, corner + e + f), (corner, corner + e + f, corner + f)]
-    radiance = np.repeat([panel["emission"][0] for panel in panels], 2)
-    return LightTriangles(np.array(corners, np.float32), radiance.astype(np.float32), is_two_sided=False)
+def source_triangles(lights: Sequence[Mapping[str, Any]], center: Shaped[F64, " 3"], radius: float) -> LightTriangles:
+    """Return area lights, or directional lights as sun disks, as triangles.
+
+    Args:
+        lights: fields as in a look, with an emission of one channel. center, radius: of a sphere around the scene,
+            meters.
+    """
+    corners, radiance = [], []
+    for light in lights:
+        geometry = LightGeometry(**{field: value for field, value in light.items() if field != "emission"})
+        triangles = _area_triangles(geometry, center, radius)
+        corners.append(triangles.corners)
+        radiance.append(triangles.relative_radiance * np.float32(light["emission"][0]))
+    return LightTriangles(np.concatenate(corners), np.concatenate(radiance), is_two_sided=False)
+
+
+def _area_triangles(geometry: LightGeometry, center: Shaped[F64, " 3"], radius: float) -> LightTriangles:
+    if geometry.kind == "directional":
+        geometry = geometry._replace(angle=max(geometry.angle, _MIN_SUN_ANGLE))
+    triangles = shape_triangles(geometry) or sun_triangles(geometry, center, radius)
+    if triangles is not None:
+        return triangles
+    corner, (e, f) = rectangle(geometry)
+    halves = np.array([(corner, corner + e, corner + e + f), (corner, corner + e + f, corner + f)], np.float32)
+    return LightTriangles(halves, np.ones(2, np.float32), is_two_sided=False)
 
 
 def _cones(cone: Shaped[F64, "M 2"]) -> tuple[F64, F64]:

@@ -25,6 +25,8 @@ UNITS = {
     "mesh": "W/(sr·m²)",
     "points": "W/sr",
     "panels": "W/(sr·m²)",
+    "directionals": "W/m²",
+    "surfaces": "W/(sr·m²)",
 }
 """Units of `emission` by the kind of light."""
 _FIELDS = {"intensity", "color", "enabled", "emission"}

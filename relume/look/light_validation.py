@@ -67,8 +67,10 @@ _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
     "tube": {**_POSITION, "direction": [1.0, 0.0, 0.0], "radius": 0.02, "length": 1.0},
     "mesh": {"material": "", "image": None},
     **{kind: {"source": ""} for kind in MEMBER_KINDS},
+    "surfaces": {"materials": []},
 }
-_SCENE_KINDS = ("mesh", *MEMBER_KINDS)  # where these lights are is of the scene
+_SOURCE_KINDS = (*MEMBER_KINDS, "surfaces")  # of many lights
+_SCENE_KINDS = ("mesh", *_SOURCE_KINDS)  # where these lights are is of the scene
 
 
 def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> dict[str, Any]:
@@ -80,8 +82,9 @@ def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> di
         if not isinstance(kind, str) or kind not in _KIND_DEFAULTS:
             raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(_KIND_DEFAULTS)}")
         documents[light.name] = _merge(pointer, light.fields, default_light(kind))
-        if kind == "mesh" and documents[light.name]["material"] not in material_names:
-            raise invalid_value((*pointer, "material"), documents[light.name]["material"], names_text(material_names))
+        for material in _emissive_materials(documents[light.name]):
+            if material not in material_names:
+                raise invalid_value((*pointer, "material"), material, names_text(material_names))
         _check_links(light.name, documents[light.name], material_names)
     return documents
 
@@ -107,10 +110,13 @@ def complete_lights(
     for name, light in lights.items():
         if light is not previous.get(name):
             _check_links(name, light, material_names)
-    _check_materials(
-        {name: light for name, light in lights.items() if light["kind"] == "mesh"}, default, material_names
-    )
+    _check_materials(lights, default, material_names)
     return lights
+
+
+def _emissive_materials(light: Mapping[str, Any]) -> list[str]:
+    """The materials whose surfaces emit a light."""
+    return [light["material"]] if light["kind"] == "mesh" else [name for name, _ in light.get("materials", ())]
 
 
 def _check_links(name: str, light: Mapping[str, Any], material_names: Collection[str]) -> None:
@@ -118,13 +124,11 @@ def _check_links(name: str, light: Mapping[str, Any], material_names: Collection
         check_link(("lights", name, field), light.get(field), material_names)  # older stores have no links
 
 
-def _check_materials(
-    mesh_lights: Mapping[str, Any], default: Mapping[str, Any], material_names: Collection[str]
-) -> None:
+def _check_materials(lights: Mapping[str, Any], default: Mapping[str, Any], material_names: Collection[str]) -> None:
     """Require that each mesh light that a look adds has a material of its own."""
-    used = {light["material"]: name for name, light in mesh_lights.items() if name in default}
-    for name in (name for name in mesh_lights if name not in default):
-        material, pointer = mesh_lights[name]["material"], ("lights", name, "material")
+    used = {material: name for name in default for material in _emissive_materials(lights[name])}
+    for name in (name for name in lights if name not in default and lights[name]["kind"] == "mesh"):
+        material, pointer = lights[name]["material"], ("lights", name, "material")
         if not isinstance(material, str) or material not in material_names:
             raise invalid_value(pointer, material, f"a material of this scene: {names_text(material_names)}")
         if used.setdefault(material, name) != name:
@@ -151,7 +155,7 @@ def _base_fields(pointer: Pointer, partial: Mapping[str, Any], default: Mapping[
         return {**default_light(kind), **default}  # older stores lack some fields
     if default is not None and default["kind"] in _SCENE_KINDS:
         raise invalid_value((*pointer, "kind"), kind, f"{default['kind']!r}; add a light with another name")
-    kinds = [name for name in _KIND_DEFAULTS if name not in (MEMBER_KINDS if default is None else _SCENE_KINDS)]
+    kinds = [name for name in _KIND_DEFAULTS if name not in (_SOURCE_KINDS if default is None else _SCENE_KINDS)]
     if kind not in kinds:
         raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(kinds)}")
     return default_light(kind)
@@ -201,6 +205,10 @@ def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, An
                 raise invalid_value(pointer, value, f"{base['source']!r}: the scene decides which lights it has")
         case "profile":
             check_profile(pointer, value)
+        case "materials":
+            if base["materials"] not in ([], value):
+                value_text = Description("another list")
+                raise invalid_value(pointer, value_text, "that of the scene, which decides which surfaces emit")
         case "image" | "gobo":
             if value is not None:
                 check_image(pointer, value)

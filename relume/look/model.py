@@ -18,7 +18,20 @@ from relume.luts.lut_store import load_table
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
-LightKind = Literal["point", "spot", "directional", "rectangle", "disc", "sphere", "tube", "mesh", "points", "panels"]
+LightKind = Literal[
+    "point",
+    "spot",
+    "directional",
+    "rectangle",
+    "disc",
+    "sphere",
+    "tube",
+    "mesh",
+    "points",
+    "panels",
+    "directionals",
+    "surfaces",
+]
 ToneMap = Literal["agx", "filmic", "none"]
 PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
@@ -175,11 +188,14 @@ class EnvironmentLook(_FrozenModel):
         return self.intensity * red, self.intensity * green, self.intensity * blue
 
 
+MaterialEmissions = tuple[tuple[str, Rgb], ...]
+
+
 class LightGeometry(NamedTuple):
     """Position and shape of a local light; fields that its kind lacks have their defaults. Lights with equal geometry
     differ only by a factor for each channel. Fields as in the look; `source`: name of a source of several lights in the
-    scene; `channel`: the one of RGB that it emits, as a part
-    of a light that emits a colored image."""
+    scene; `channel`: the one of RGB that it emits, as a part of a light that emits a colored image, or of surfaces of
+    several colors."""
 
     kind: LightKind
     position: Xyz = (0.0, 0.0, 0.0)
@@ -193,11 +209,22 @@ class LightGeometry(NamedTuple):
     material: str = ""
     image: str | None = None
     source: str = ""
+    materials: MaterialEmissions = ()
     channel: int | None = None
     link: Link | None = None
     shadow_link: Link | None = None
     profile: str | None = None
     gobo: str | None = None
+
+    @property
+    def is_source(self) -> bool:
+        """True for a source of many lights of the scene."""
+        return bool(self.source or self.materials)
+
+    @property
+    def material_emissions(self) -> MaterialEmissions:
+        """The materials whose surfaces emit this light, with their emission relative to the light's."""
+        return ((self.material, (1.0, 1.0, 1.0)),) if self.kind == "mesh" else self.materials
 
 
 class LightGroupLook(_FrozenModel):
@@ -349,16 +376,35 @@ class PointsLook(_LightLook):
 
 
 class PanelsLook(_LightLook):
-    """Many rectangles of the scene as one source, its `source`; emission is their mean radiance."""
+    """Many area lights of the scene as one source, its `source`; emission is their mean radiance by area."""
 
     kind: Literal["panels"]
     source: str
 
 
+class DirectionalsLook(_LightLook):
+    """Many directional lights of the scene as one source, its `source`; emission is their mean irradiance."""
+
+    kind: Literal["directionals"]
+    source: str
+
+
+class SurfacesLook(_LightLook):
+    """All surfaces of several materials of the scene as one source; emission is their mean radiance by area.
+
+    `materials`: each with its radiance over the mean, for each channel.
+    """
+
+    kind: Literal["surfaces"]
+    materials: MaterialEmissions
+
+
 AreaLook = RectangleLook | DiscLook | SphereLook | TubeLook
 """Area lights other than emissive meshes."""
 SingleLightLook = PointLook | SpotLook | DirectionalLook | AreaLook | MeshLook
-LightLook = Annotated[SingleLightLook | PointsLook | PanelsLook, Field(discriminator="kind")]
+MembersLook = PointsLook | PanelsLook | DirectionalsLook
+"""Sources of many lights whose places are of the scene."""
+LightLook = Annotated[SingleLightLook | MembersLook | SurfacesLook, Field(discriminator="kind")]
 
 
 _MANY_BOUNCES = 8  # later ones bring hardly any light

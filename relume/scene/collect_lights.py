@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote
 from relume.scene.emission import normalize_emission
 from relume.scene.light_prefix import name_prefix
-from relume.scene.merge_lights import merge_lights
+from relume.scene.merge_lights import merge_lights, surface_area
 from relume.scene.model import Light, Material, Mesh
 from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHTS
@@ -119,6 +119,8 @@ def light_powers(lights: Sequence[Light], materials: Sequence[Material], meshes:
             return np.pi * areas.get(fields["material"], 0.0)
         if fields["kind"] == "directional":
             return np.pi * diagonal**2 / 4
+        if area := surface_area(fields):
+            return np.pi * area
         half_angle = np.radians(fields["cone"][1]) if fields["kind"] == "spot" else np.pi
         return float(2 * np.pi * (1 - np.cos(half_angle)))
 

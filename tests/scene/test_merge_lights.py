@@ -96,7 +96,7 @@ def test_a_thousand_lights_of_any_name_and_color_keep_their_power() -> None:
     assert any("colors; all get their mean color" in warning for warning in warnings)
     rest = lights[-1].members
     assert rest is not None
-    assert {each["kind"] for each in rest.light_fields("points", (1.0, 1.0, 1.0))} == {"point", "spot"}
+    assert {each["kind"] for each in rest.light_fields((1.0, 1.0, 1.0))} == {"point", "spot"}
 
 
 def test_rectangles_have_their_mean_radiance_by_area() -> None:
@@ -111,7 +111,7 @@ def test_rectangles_have_their_mean_radiance_by_area() -> None:
     (source,), _ = collected(panels)
     np.testing.assert_allclose(source.fields["emission"], (1 * 1 + 2 * 2) / 3)  # W/sr/m²
     assert source.members is not None
-    fields = source.members.light_fields("panels", source.fields["emission"])
+    fields = source.members.light_fields(source.fields["emission"])
     np.testing.assert_allclose([each["emission"][0] for each in fields], [1 + k % 2 for k in range(66)], rtol=1e-6)
     assert [each["size"] for each in fields[:2]] == [[1.0, 1.0], [1.0, 2.0]]
 
@@ -123,23 +123,91 @@ def test_dark_lights_are_a_source_that_can_be_turned_up() -> None:
     assert (source.members.relative_emission == 1).all()
 
 
-def test_emissive_materials_beyond_the_limit_are_left_out_with_a_warning() -> None:
+def glowing(colors: Any) -> tuple[list[Light], list[ImporterWarning]]:
+    """A dim point light, and a material of each emission with a square meter."""
     warnings: list[ImporterWarning] = []
     collector = LightCollector(warnings)
     collector.add(collector.name("Key"), point(0), np.full(3, 1e-3))
-    materials = [replace(WHITE, name=f"Glow {k}") for k in range(70)]
-    meshes = [replace(FLOOR, name=f"floor {k}", material=k) for k in range(70)]
-    collector.emissive_light(materials, [np.full(3, 1.0 + k) for k in range(70)], meshes)
-    names = [light.name for light in collector.lights]
-    assert len(names) == MAX_LIGHTS
-    assert "Key" in names
-    assert {"Glow 69", "Glow 7"} <= set(names)
-    assert "Glow 6" not in names
-    assert "7 emissive materials or directional lights, the dimmest, were left out, for example “Glow 0”" in warnings[0]
-    assert warnings[0].severity == "unsupported"
+    materials = [replace(WHITE, name=f"Glow {k}") for k in range(len(colors))]
+    meshes = [replace(FLOOR, name=f"floor {k}", material=k) for k in range(len(colors))]
+    collector.emissive_light(materials, list(np.array(colors, np.float64)), meshes)
+    return collector.lights, warnings
 
 
-@pytest.mark.parametrize("rows", [np.zeros((2, 11)), np.zeros((0, 12)), np.full((1, 12), np.nan), np.zeros(12)])
+def test_the_least_powerful_emissive_materials_are_one_source_of_their_own_colors() -> None:
+    colors = [[1.0 + k, 2.0, 0.0] for k in range(70)]
+    lights, warnings = glowing(colors)
+    assert len(lights) == MAX_LIGHTS
+    source = next(light for light in lights if light.fields["kind"] == "surfaces")
+    assert source.name == "Other emissive materials"
+    assert {name for name, _ in source.fields["materials"]} == {f"Glow {k}" for k in range(8)}
+    np.testing.assert_allclose(source.fields["emission"], np.mean(colors[:8], axis=0))
+    emitted = {name: np.multiply(rgb, source.fields["emission"]).tolist() for name, rgb in source.fields["materials"]}
+    assert emitted == {f"Glow {k}": pytest.approx(colors[k]) for k in range(8)}
+    assert {light.name for light in lights} >= {"Key", "Glow 8", "Glow 69"}
+    assert len(warnings) == 1
+    assert warnings[0].startswith("8 of 71 lights were merged into 1 source, for example “Other emissive materials”:")
+    assert warnings[0].severity == "approximated"
+
+
+def test_a_dim_emissive_material_still_shines() -> None:
+    lights, _ = glowing([[1e-6] * 3] + [[1.0] * 3] * 70)
+    source = next(light for light in lights if light.fields["kind"] == "surfaces")
+    relative = dict(source.fields["materials"])["Glow 0"]
+    assert relative[0] * source.fields["emission"][0] == pytest.approx(1e-6)
+    assert len(set(relative)) == 1
+
+
+def test_directional_lights_are_one_source_with_their_angles() -> None:
+    directionals = [
+        (f"Sun {chr(65 + k % 26)}{k}x", {"kind": "directional", "direction": [k, -1, 0], "angle": k / 100}, [1 + k] * 3)
+        for k in range(70)
+    ]
+    lights, warnings = collected(directionals)
+    assert len(lights) == MAX_LIGHTS
+    source = lights[-1]
+    assert source.fields == {"kind": "directionals", "source": "Other lights", "emission": pytest.approx([4.0] * 3)}
+    assert source.members is not None
+    fields = source.members.light_fields(source.fields["emission"])
+    assert sorted((each["emission"][0], each["direction"][0]) for each in fields) == [
+        (pytest.approx(1 + k), k) for k in range(7)
+    ]
+    assert max(each["angle"] for each in fields) == pytest.approx(0.06)
+    assert "7 of 70 lights were merged" in warnings[0]
+
+
+def test_round_lights_are_members_weighted_by_their_area() -> None:
+    shapes: list[dict[str, Any]] = [
+        {"kind": "disc", "direction": [0, -1, 0], "radius": 1.0},
+        {"kind": "sphere", "radius": 0.5},
+        {"kind": "tube", "direction": [1, 0, 0], "radius": 0.25, "length": 2.0},
+    ]
+    lights, _ = collected(
+        [(f"Bulb.{k:03}", {"position": [k, 1, 0], **shapes[k % 3]}, [1 + k % 3] * 3) for k in range(66)]
+    )
+    (source,) = lights
+    assert source.members is not None
+    np.testing.assert_allclose(source.fields["emission"], 2.0)  # all have an area of π
+    fields = source.members.light_fields(source.fields["emission"])
+    for k, shape in enumerate(shapes):
+        assert fields[k] == {"position": [k, 1, 0], **shape, "emission": pytest.approx([1 + k] * 3)}
+
+
+def test_links_of_merged_lights_stay_or_are_reported() -> None:
+    link = {"exclude": {"materials": ["White"], "objects": []}}
+    lights, warnings = collected([(f"Bulb.{k:03}", {**point(k), "link": link}, [1] * 3) for k in range(66)])
+    assert lights[0].fields["link"] == link
+    assert len(warnings) == 1
+    names = [chr(65 + k % 26) + chr(65 + k // 26) for k in range(70)]
+    fields = [{**point(k), **({"link": link} if k % 2 else {})} for k in range(70)]
+    lights, warnings = collected([(name, each, [1] * 3) for name, each in zip(names, fields, strict=True)])
+    assert lights[-1].fields.get("link") is None
+    assert "have different links; they light all objects" in warnings[0]
+
+
+@pytest.mark.parametrize(
+    "rows", [np.zeros((2, 12)), np.zeros((0, 16)), np.full((1, 16), np.nan), np.zeros(16), np.full((1, 16), 7.0)]
+)
 def test_damaged_members_are_refused(rows: Any) -> None:
     with pytest.raises(SceneError, match="import the scene again"):
         LightMembers.from_rows(rows)

@@ -200,7 +200,7 @@ class UnoccludedLight:
         is_coarse = is_preview and light.environment != BAKED_ENVIRONMENT
         image = self._from_triangles(light, is_preview=is_coarse)[self._normal_index]
         for geometry, gain in light.local:
-            if geometry.kind != "mesh":
+            if not geometry.material_emissions:
                 image += np.outer(self._unoccluded(geometry), np.array(gain, np.float32) / np.float32(np.pi))
         return np.asarray(image, np.float32)
 

@@ -7,10 +7,16 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+from jaxtyping import Shaped
+from numpy.typing import NDArray
+
 from relume.brdf.albedo import Reflectance, Reflectances, material_reflectance
 from relume.brdf.texture_slots import EmissionImage, NormalMap
 from relume.look import EnvironmentKey, LightGeometry, LightPaths, Look
 from relume.look.model import Link, Rgb
+
+F32 = NDArray[np.float32]
 
 ENVIRONMENT = "environment"  # name of the environment among the names of sources
 
@@ -196,6 +202,9 @@ def _lit_local_lights(look: Look, solo_sources: frozenset[str] | None) -> Iterat
 def _emitted_parts(source: LightSource, images: Mapping[LightGeometry, EmissionImage]) -> Iterator[LightSource]:
     """Yield a light; one with an image or a gobo in its mean color, and if it is colored, a light for each channel."""
     geometry, gain = source
+    if any(len(set(relative)) > 1 for _, relative in geometry.materials):
+        yield from _channels(source)
+        return
     if geometry.image is None and geometry.gobo is None:
         yield source
         return
@@ -204,15 +213,31 @@ def _emitted_parts(source: LightSource, images: Mapping[LightGeometry, EmissionI
     if not image.is_colored:
         yield LightSource(geometry, (red, green, blue))
         return
+    yield from _channels(LightSource(geometry, (red, green, blue)))
+
+
+def _channels(source: LightSource) -> Iterator[LightSource]:
+    """Yield a light for each channel of a light."""
+    geometry, (red, green, blue) = source
     for channel, part in enumerate(((red, 0.0, 0.0), (0.0, green, 0.0), (0.0, 0.0, blue))):
         yield LightSource(geometry._replace(channel=channel), part)
 
 
-def material_emission(light: Illumination, material: str) -> Rgb:
-    """Return the radiance that the surfaces of a material emit toward the camera."""
-    gains = [gain for geometry, gain in light.local if geometry.material == material and light.paths.direct]
-    red, green, blue = (sum(channel) for channel in zip((0.0, 0.0, 0.0), *gains, strict=True))
-    return red, green, blue
+def material_emissions(
+    light: Illumination, materials: Sequence[str], *, is_visible: bool = False
+) -> Shaped[F32, "materials 3"]:
+    """Return the radiance that the surfaces of each material emit.
+
+    Args:
+        light: the illumination. materials: names of all materials. is_visible: zeros in light that excludes direct
+            illumination, as the camera sees them.
+    """
+    emission = np.zeros((len(materials), 3), np.float32)
+    index = {name: k for k, name in enumerate(materials)}
+    for geometry, gain in light.local if light.paths.direct or not is_visible else ():
+        for material, relative in geometry.material_emissions:
+            emission[index[material]] += np.multiply(gain, relative, dtype=np.float32)
+    return emission
 
 
 def geometries(look: Look) -> Iterator[LightGeometry]:

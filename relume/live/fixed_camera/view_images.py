@@ -28,7 +28,7 @@ from relume.live.fixed_camera.illumination import (
     images_by_material,
     is_solo,
     links,
-    material_emission,
+    material_emissions,
     picture_gain,
 )
 from relume.live.fixed_camera.live_term import LiveTerm
@@ -190,9 +190,9 @@ class ViewImages:
         """Set the emission of surfaces in this light."""
         sources = (geometry for geometry, _ in light.local)
         images = images_by_material(emission_images(sources, self.transfer.local.emission_image))
-        for name, material in self.by_name.items():
-            image = images.get(name)
-            material.set_emission(material_emission(light, name), image, self._emission_pattern)
+        emissions = material_emissions(light, list(self.by_name), is_visible=True)
+        for (name, material), (red, green, blue) in zip(self.by_name.items(), emissions.tolist(), strict=True):
+            material.set_emission((red, green, blue), images.get(name), self._emission_pattern)
 
     def update_mirrors(self, look: Look) -> list[int]:
         """Update the mirrors to the displayed documents; returns the materials whose specular albedo changed."""

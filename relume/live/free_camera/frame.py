@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import EmissionImage, NormalMap, user_images
-from relume.live.fixed_camera.illumination import Illumination, material_emission
+from relume.live.fixed_camera.illumination import Illumination, material_emissions
 from relume.live.free_camera.antialiasing import resolve
 from relume.live.free_camera.background import ShadowCatcher, background_radiance, composite_over
 from relume.live.free_camera.basis.highlight_lobes import Lobes, build_lobes
@@ -381,7 +381,7 @@ def _shade(
         interpolate_to_nodes(stored_scene, node_mask, *values) for values in zip(probe_values, node_values, strict=True)
     )
     light_gradient = _node_light_gradient(stored_scene, incident, gbuffer) if light_gradient is None else light_gradient
-    emission = np.array([material_emission(state.light, name) for name in transfer.material_names], np.float32)
+    emission = material_emissions(state.light, transfer.material_names, is_visible=True)
     pixel_angle, interpolated_probes = (
         camera.yfov / height,
         InterpolatedProbes(node_radiance, materials.is_reflective, light_gradient),

@@ -26,7 +26,12 @@ from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
-from relume.live.fixed_camera.illumination import Illumination, emission_images, images_by_material
+from relume.live.fixed_camera.illumination import (
+    Illumination,
+    emission_images,
+    images_by_material,
+    material_emissions,
+)
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.free_camera.lobe_lights import LobeLight
 from relume.live.opened.few_lobe_rays import FewLobeRays
@@ -363,7 +368,7 @@ class BakedFixedViews:
         reflectances = light.reflectances
         goes_on = light.paths.has_all_bounces and bool(narrow_surfaces(reflectances))
         patch_light = self._patch_light(light, is_canceled) if outgoing is None else outgoing
-        light_args = patch_light, self._mesh_emission(light)
+        light_args = patch_light, material_emissions(light, self.material_names)
         surface_args = reflectances, self._hit_images(light), self._lobe_patches(reflectances)
         links = LightLinks(self.local.linked, light, self.material_names)
         return self.lobe_tracer.scene(*surface_args, *light_args, links, goes_on=goes_on)
@@ -372,14 +377,6 @@ class BakedFixedViews:
         """Return the images of a look that lobe rays meet."""
         images = emission_images((source.geometry for source in light.local), self.local.emission_image)
         return hit_images(light.reflectances, self.material_names, images_by_material(images))
-
-    def _mesh_emission(self, light: Illumination) -> Shaped[F32, "materials 3"]:
-        """Return the radiance of the surfaces of each material that is a light; its image is relative to it."""
-        emission = np.zeros((len(self.material_names), 3), np.float32)
-        for geometry, gain in light.local:
-            if geometry.kind == "mesh":
-                emission[self.material_names.index(geometry.material)] += np.array(gain, np.float32)
-        return emission
 
     def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
         """Return the textures and reflectances of patches, for lobe rays: there are none."""

@@ -361,7 +361,7 @@ class BakedFreeCamera:
         environment = self._darkened(environment, light.environment.link, rows)
         radiance = environment * np.array(light.environment_gain, np.float32)
         for geometry, gain in light.local:
-            if geometry.kind != "mesh":
+            if not geometry.material_emissions:
                 irradiance = cache.get_value((*key, geometry), lambda geometry=geometry: compute_local(geometry))  # type: ignore[misc]
                 irradiance = self._darkened(irradiance, geometry.link, rows)
                 radiance += np.outer(irradiance, np.array(gain, np.float32) / np.float32(np.pi))

@@ -175,8 +175,9 @@ class LightLinks:
             throughput[~is_lit_entry & (paths.kind != END)] = 0
             paths = paths._replace(throughput=throughput)
         for geometry, _ in self.light.local:
-            if geometry.kind == "mesh" and geometry.link is not None:
-                emits = paths.emitter == self.materials.index(geometry.material)
+            if geometry.material_emissions and geometry.link is not None:
+                emitters = [self.materials.index(material) for material, _ in geometry.material_emissions]
+                emits = np.isin(paths.emitter, emitters)
                 is_dark = emits & ~self.linked.faces(geometry.link)[paths.face]
                 paths = paths._replace(emitter=np.where(is_dark, NO_EMITTER, paths.emitter))
         return replace(hits, escapes=escapes, paths=paths)

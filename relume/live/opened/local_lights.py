@@ -22,8 +22,8 @@ from relume.lights.local_lights import (
     emitter_geometry,
     make_light_strata,
     outer_angle,
-    panel_triangles,
     prepare_local_lights,
+    source_triangles,
 )
 from relume.lights.shape_triangles import LightTriangles, sun_triangles
 from relume.live.fixed_camera.illumination import Illumination, LightSource
@@ -43,6 +43,7 @@ from relume.store.bake_protocol import StoreReader
 from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 
 SAMPLES = 64  # of a rectangle, per view sample
 MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # mesh lights have more samples, if the scene has few emissive materials
@@ -120,7 +121,7 @@ class LocalLights:
         """
         lights = self._store.attributes["look"]["lights"].values()
         has_few_meshes = sum(light["kind"] == "mesh" for light in lights) <= MAX_FINE_MESHES
-        return rectangle_samples * (MESH_SAMPLE_FACTOR if geometry.kind == "mesh" and has_few_meshes else 1)
+        return rectangle_samples * (MESH_SAMPLE_FACTOR if geometry.material_emissions and has_few_meshes else 1)
 
     def rays_to(
         self,
@@ -232,28 +233,48 @@ class LocalLights:
     def _build_light(self, geometry: LightGeometry) -> LocalLight:
         if geometry.source:
             return self._build_members(geometry)
+        if geometry.kind == "surfaces":
+            return prepare_local_lights(geometry, self._surfaces(geometry))
         if geometry.kind != "mesh":
-            low, high = (end(self.positions, axis=0).astype(np.float64) for end in (np.min, np.max))
-            sun = sun_triangles(geometry, (low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+            sun = sun_triangles(geometry, *self._bounds())
             return prepare_local_lights(geometry, sun, intensity_table=self._intensity_table(geometry))
-        material, face_mask = self._emissive_faces(geometry.material)
         if geometry.image is not None:
+            is_two_sided = self._is_two_sided(self._emissive_faces(geometry.material)[0])
             emitter = self._image_emitter(geometry.material, geometry.image)
             relative_radiance = emitter.relative_radiance(geometry.channel)
-            triangles = LightTriangles(emitter.corners, relative_radiance, self._is_two_sided(material))
+            triangles = LightTriangles(emitter.corners, relative_radiance, is_two_sided)
             return prepare_local_lights(geometry, triangles)
+        return prepare_local_lights(geometry, self._emissive_triangles(geometry.material))
+
+    def _emissive_triangles(self, name: str) -> LightTriangles:
+        """The surfaces of a material with the emission of the scene."""
+        material, face_mask = self._emissive_faces(name)
         face_emission = np.ones(np.count_nonzero(face_mask), np.float32)
         if self._store.attributes.get("has_emission_images"):
             face_emission = self._store.read("scene/face_emission")[face_mask]
-        corners = self.positions[self.faces[face_mask]]
-        return prepare_local_lights(geometry, LightTriangles(corners, face_emission, self._is_two_sided(material)))
+        return LightTriangles(self.positions[self.faces[face_mask]], face_emission, self._is_two_sided(material))
+
+    def _surfaces(self, geometry: LightGeometry) -> LightTriangles:
+        """The surfaces of several materials in one channel; those that emit to both sides twice, once for each."""
+        corners, radiance = [], []
+        for name, relative in geometry.materials:
+            triangles = self._emissive_triangles(name)
+            for order in (1, -1) if triangles.is_two_sided else (1,):
+                corners.append(triangles.corners[:, ::order])
+                radiance.append(triangles.relative_radiance * np.float32(relative[geometry.channel or 0]))
+        return LightTriangles(np.concatenate(corners), np.concatenate(radiance), is_two_sided=False)
+
+    def _bounds(self) -> tuple[Shaped[F64, " 3"], float]:
+        """Center and radius of a sphere around the scene, meters."""
+        low, high = (end(self.positions, axis=0).astype(np.float64) for end in (np.min, np.max))
+        return (low + high) / 2, float(np.linalg.norm(high - low)) / 2
 
     def _build_members(self, geometry: LightGeometry) -> LocalLight:
         members = read_light_members(self._store, geometry.source)
         if geometry.kind == "points":
             points = LightPoints(members.position, members.direction, members.cone, members.relative_emission)
             return prepare_local_lights(geometry, points=points)
-        return prepare_local_lights(geometry, panel_triangles(members.light_fields("panels", (1.0,))))
+        return prepare_local_lights(geometry, source_triangles(members.light_fields((1.0,)), *self._bounds()))
 
     def _intensity_table(self, geometry: LightGeometry) -> Shaped[F32, "polar azimuth"]:
         """Intensity of a light over directions. Raises NotFoundError, SceneError: an asset cannot be loaded."""

@@ -7,7 +7,7 @@ import { EmissionImage } from "./images/EmissionImage";
 import { MetalnessImage } from "./images/MetalnessImage";
 import { NormalImage } from "./images/NormalImage";
 import { openLibrary } from "../library/libraryItems";
-import { LightInspector } from "../lights/LightInspector";
+import { LightInspector } from "./lights/LightInspector";
 import { openLight } from "../lights/lightEdits";
 import { MAX_TERMS } from "../../look.gen";
 import { defaultLook, look } from "../../state/look";

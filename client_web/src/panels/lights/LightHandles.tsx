@@ -71,6 +71,8 @@ const SHAPES: Record<LightKind | "aim", string> = {
   mesh: "",
   points: "",
   panels: "",
+  directionals: "",
+  surfaces: "",
   aim: "M0 -6l6 6l-6 6l-6 -6z",
 };
 

@@ -42,6 +42,8 @@ export function anchorsOf(light: Light, camera: ProjectionCamera): Anchors | nul
     case "mesh":
     case "points":
     case "panels":
+    case "directionals":
+    case "surfaces":
       return null;
   }
 }

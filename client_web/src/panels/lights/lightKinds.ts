@@ -5,7 +5,7 @@ import { isAimed } from "./handleGeometry";
 import { add, length, scale, subtract, roundComponents } from "./vector";
 
 /** Kinds that can be added; emissive meshes come with a scene or an emission map, sources of many lights with a scene. */
-export type AddedKind = Exclude<LightKind, "mesh" | "points" | "panels">;
+export type AddedKind = Exclude<LightKind, "mesh" | "points" | "panels" | "directionals" | "surfaces">;
 
 interface LightKindLabels {
   kind: AddedKind;
@@ -28,7 +28,9 @@ export const LIGHT_KINDS: readonly LightKindLabels[] = [
 const SCENE_LABELS: Record<Exclude<LightKind, AddedKind>, string> = {
   mesh: "Emissive mesh",
   points: "Many lights",
-  panels: "Many panels",
+  panels: "Many area lights",
+  directionals: "Many sun lights",
+  surfaces: "Emissive meshes",
 };
 
 export function labelOf(kind: LightKind): string {
@@ -54,6 +56,8 @@ export const UNITS: Record<LightKind, string> = {
   mesh: "W/sr/m²",
   points: "W/sr",
   panels: "W/sr/m²",
+  directionals: "W/m²",
+  surfaces: "W/sr/m²",
 };
 
 /** The clicked surface point, and the brightness of the image. */

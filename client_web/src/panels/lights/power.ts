@@ -16,18 +16,30 @@ export interface PhotometricUnits {
 const POWER: PhotometricUnits = { label: "Power", watts: "W", lumens: "lm" };
 /** Directional lights have no power, but an irradiance on a perpendicular surface. */
 const IRRADIANCE: PhotometricUnits = { label: "Illuminance", watts: "W/m²", lumens: "lx" };
+const MEAN_IRRADIANCE: PhotometricUnits = { ...IRRADIANCE, label: "Mean illuminance" };
 /** For many lights as one source, whose number belongs to the scene. */
 const INTENSITY: PhotometricUnits = { label: "Mean intensity", watts: "W/sr", lumens: "cd" };
 /** For lights with an IES file or a gobo: as data sheets state it. */
 const PEAK_INTENSITY: PhotometricUnits = { label: "Peak intensity", watts: "W/sr", lumens: "cd" };
-/** For emissive meshes and many panels, whose area belongs to the scene. */
+/** For emissive meshes and many area lights, whose area belongs to the scene. */
 const RADIANCE: PhotometricUnits = { label: "Radiance", watts: "W/sr/m²", lumens: "cd/m²" };
 
 export function unitsOf(light: Light): PhotometricUnits {
-  if (light.kind === "directional") return IRRADIANCE;
-  if (light.kind === "points") return INTENSITY;
   if (isShaped(light)) return PEAK_INTENSITY;
-  return light.kind === "mesh" || light.kind === "panels" ? RADIANCE : POWER;
+  switch (light.kind) {
+    case "directional":
+      return IRRADIANCE;
+    case "directionals":
+      return MEAN_IRRADIANCE;
+    case "points":
+      return INTENSITY;
+    case "mesh":
+    case "panels":
+    case "surfaces":
+      return RADIANCE;
+    default:
+      return POWER;
+  }
 }
 
 /** True for a light with an IES file or a gobo: its power depends on it. */

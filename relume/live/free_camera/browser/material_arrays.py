@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.texture_slots import TEXTURES
-from relume.live.fixed_camera.illumination import material_emission
+from relume.live.fixed_camera.illumination import material_emissions
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
 from relume.live.free_camera.basis.lobe_shapes import NUM_AZIMUTHS, NUM_GRID_DIRECTIONS
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
@@ -222,8 +222,8 @@ def _material_rows(
     out[:, NUM_GROUPS, 0] = lobes.lobe_index
     out[:, NUM_GROUPS, 1] = material_textures[:, NORMAL_MAP]
     out[:, NUM_GROUPS, 2] = [state.look.materials[name].shadow_catcher for name in transfer.material_names]
-    emission = [(*material_emission(state.light, name), 0) for name in transfer.material_names]
-    out[:, NUM_GROUPS + 1] = np.array(emission, np.float32).view(np.int32)
+    emission = material_emissions(state.light, transfer.material_names, is_visible=True)
+    out[:, NUM_GROUPS + 1, :3] = emission.view(np.int32)
     out[:, NUM_GROUPS + 1, 3] = material_textures[:, EMISSION]
     return out.reshape(-1, 4)
 

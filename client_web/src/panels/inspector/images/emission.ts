@@ -19,12 +19,18 @@ export function meshLightOf(lights: Lights, material: string): NamedMeshLight | 
   return null;
 }
 
-/** The light by which a material emits an image; null if there are too many lights for a new one. */
+const isMerged = (lights: Lights, material: string) =>
+  Object.values(lights).some(
+    (light) => light.kind === "surfaces" && light.materials.some(([emissive]) => emissive === material),
+  );
+
+/** The light by which a material emits an image; null if there are too many lights for a new one, or if the material
+ * is of a source of several. */
 export function emittingLight(lights: Lights, material: string, image: string): NamedMeshLight | null {
   const existing = meshLightOf(lights, material);
   if (existing !== null) return { ...existing, light: { ...existing.light, image, enabled: true } };
   const names = Object.keys(lights);
-  if (names.length >= MAX_LIGHTS) return null;
+  if (names.length >= MAX_LIGHTS || isMerged(lights, material)) return null;
   const name = nextLightName(material.slice(0, MAX_LIGHT_NAME), names);
   return { name, light: { ...DEFAULT_LIGHTS.mesh, material, image } };
 }

@@ -1,10 +1,10 @@
 /** The gobo of a spot: an image that it projects. */
 import { useEffect } from "preact/hooks";
-import { history } from "../../edit/history";
-import type { ImageBody } from "../../protocol";
-import { ImageChoice } from "../inspector/images/ImageChoice";
-import { imageUploadProgress, loadImages } from "../inspector/images/imageStore";
-import { editLight } from "./lightEdits";
+import { history } from "../../../edit/history";
+import type { ImageBody } from "../../../protocol";
+import { ImageChoice } from "../images/ImageChoice";
+import { imageUploadProgress, loadImages } from "../images/imageStore";
+import { editLight } from "../../lights/lightEdits";
 
 function setGobo(label: string, name: string, gobo: string | null): void {
   history.endGesture();

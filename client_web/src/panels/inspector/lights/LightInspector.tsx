@@ -1,22 +1,22 @@
 /** The selected light: type, emission, position and direction. */
-import { editValue } from "../../edit/edit";
-import { beginDrag } from "../../session/prepare";
-import { MAX_LIGHT_NAME } from "../../look.gen";
-import type { Light, Triple } from "../../protocol";
-import { defaultLook } from "../../state/look";
-import { aimLocked } from "../../state/panels";
-import { IconButton } from "../../ui/IconButton";
-import { EditableName } from "../../ui/EditableName";
-import { LabeledSlider } from "../../ui/LabeledSlider";
-import { NumberField } from "../../ui/NumberField";
-import { Emission } from "./Emission";
-import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "./lightFields";
+import { editValue } from "../../../edit/edit";
+import { beginDrag } from "../../../session/prepare";
+import { MAX_LIGHT_NAME } from "../../../look.gen";
+import type { Light, Triple } from "../../../protocol";
+import { defaultLook } from "../../../state/look";
+import { aimLocked } from "../../../state/panels";
+import { IconButton } from "../../../ui/IconButton";
+import { EditableName } from "../../../ui/EditableName";
+import { LabeledSlider } from "../../../ui/LabeledSlider";
+import { NumberField } from "../../../ui/NumberField";
+import { Emission } from "../../lights/Emission";
+import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "../../lights/lightFields";
 import { GoboField } from "./GoboField";
-import { isAimed, placeLight } from "./handleGeometry";
-import { IesField } from "./IesField";
-import { LinkField } from "./LinkField";
-import { createGroup, groupOfLight, lightGroups, moveToGroup } from "./lightGroups";
-import { completeLight, LIGHT_KINDS, labelOf, changeKind, isAddedKind, type AddedKind } from "./lightKinds";
+import { isAimed, placeLight } from "../../lights/handleGeometry";
+import { IesField } from "../../lights/IesField";
+import { LinkField } from "../../lights/LinkField";
+import { createGroup, groupOfLight, lightGroups, moveToGroup } from "../../lights/lightGroups";
+import { completeLight, LIGHT_KINDS, labelOf, changeKind, isAddedKind, type AddedKind } from "../../lights/lightKinds";
 import {
   changeLight,
   duplicateLight,
@@ -25,7 +25,7 @@ import {
   lightPath,
   removeLight,
   renameLight,
-} from "./lightEdits";
+} from "../../lights/lightEdits";
 
 interface NamedLight {
   name: string;
