@@ -39,12 +39,13 @@ def merge_lights(
     if len(lights) <= MAX_LIGHTS:
         return list(lights)
     power = dict(zip((light.name for light in lights), powers, strict=True))
-    sources = sorted(_equal_lights(lights), key=lambda source: -sum(power[light.name] for light in source))
+    sources = _equal_lights(lights)
+    ranking = sorted(range(len(sources)), key=lambda k: -sum(power[light.name] for light in sources[k]))
     kinds = list(dict.fromkeys(map(_source_kind, lights)))
     num_bright = len(sources) if len(sources) <= MAX_LIGHTS else MAX_LIGHTS - len(kinds)
-    dim = [light for source in sources[num_bright:] for light in source]
-    merged = [_merge(source, power, source[0].group or source[0].name, new_name) for source in sources[:num_bright]]
-    rests = ([light for light in dim if _source_kind(light) == kind] for kind in kinds)
+    bright, dim = ([sources[k] for k in sorted(part)] for part in (ranking[:num_bright], ranking[num_bright:]))
+    merged = [_merge(source, power, source[0].group or source[0].name, new_name) for source in bright]
+    rests = ([light for source in dim for light in source if _source_kind(light) == kind] for kind in kinds)
     merged += [_merge_rest(rest, power, new_name, warnings) for rest in rests if rest]
     of_many = [light for light in merged if _num_lights(light) > 1]
     num = sum(map(_num_lights, of_many))

@@ -67,7 +67,7 @@ def test_one_more_makes_a_source_of_their_group_and_color() -> None:
     intensities = np.linspace(1, 3, MAX_LIGHTS)
     white = [(f"Bulb.{k:03}", point(k), [i, i, i]) for k, i in enumerate(intensities)]
     lights, warnings = collected([*white, ("Bulb.red", point(99), [1, 0, 0]), ("Bulb.999", point(98), [2, 0, 0])])
-    assert [light.name for light in lights] == ["Bulb", "Bulb.999", "Bulb.red"]
+    assert [light.name for light in lights] == ["Bulb", "Bulb.red", "Bulb.999"]
     source = lights[0]
     assert source.members is not None
     assert source.group == "Bulb"

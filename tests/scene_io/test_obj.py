@@ -171,14 +171,17 @@ def test_an_emissive_material_without_surface_is_no_light(tmp_path: Path) -> Non
     assert any("“bulb” emits no light: no surface" in warning for warning in scene.warnings)
 
 
-def test_the_brightest_sixty_four_emissive_materials_are_lights(tmp_path: Path) -> None:
+def test_the_least_powerful_emissive_materials_beyond_the_limit_are_one_light(tmp_path: Path) -> None:
     library = "".join(f"newmtl m{k}\nKe {k + 1}\n" for k in range(65))
     faces = "".join(f"usemtl m{k}\nf 1 2 3\n" for k in range(65))
     (tmp_path / "a.mtl").write_text(library)
     (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{SQUARE}{faces}")
     scene = import_scene(tmp_path / "a.obj", "lights", LIGHT)
-    assert [light.name for light in scene.lights] == [f"m{k}" for k in range(1, 65)]
-    assert any("1 of 65 lights" in warning and "“m0”" in warning for warning in scene.warnings)
+    *single, merged = scene.lights
+    assert [light.name for light in single] == [f"m{k}" for k in range(2, 65)]
+    emissions = {name: np.multiply(share, merged.fields["emission"]) for name, share in merged.fields["materials"]}
+    assert emissions == {"m0": pytest.approx([1.0] * 3), "m1": pytest.approx([2.0] * 3)}
+    assert any("2 of 65 lights were merged into 1 source" in warning for warning in scene.warnings)
 
 
 def test_missing_files_give_a_warning(tmp_path: Path) -> None:
