@@ -56,6 +56,15 @@ def check_readable(option: str, path: Path) -> Path:
         raise ParameterError(option, str(path), f"a file that exists and can be read ({error.strerror})") from None
 
 
+def read_bounded(option: str, path: Path, max_bytes: int) -> bytes:
+    """Read a file of at most `max_bytes`. Raises ParameterError."""
+    with check_readable(option, path).open("rb") as file:
+        data = file.read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise ParameterError(option, str(path), f"a file of at most {max_bytes / 1e6:g} MB")
+    return data
+
+
 def read_look(path: Path | None) -> dict[str, object]:
     """Read a look document; empty without a path. Raises ParameterError."""
     if path is None:

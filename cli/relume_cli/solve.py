@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from relume_cli.options import BakeName, Data, LookFile, View, check_readable, read_json, read_look
+from relume_cli.options import BakeName, Data, LookFile, View, read_bounded, read_json, read_look
 from relume_cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
@@ -47,11 +47,12 @@ def solve(
     """
     from relume.core.errors import ParameterError
     from relume.core.filesystem import atomic_write
+    from relume.images.read_image import MAX_FILE_BYTES
     from relume_cli.data_folder import find_bake_and_view, open_bakes, open_settings
 
     if reference is None and strokes is None:
         raise ParameterError("--reference", "missing", "a picture, or --strokes")
-    picture = None if reference is None else check_readable("--reference", reference).read_bytes()
+    picture = None if reference is None else read_bounded("--reference", reference, MAX_FILE_BYTES)
     fields: dict[str, Any] = {
         "look": read_look(look),
         "strokes": [] if strokes is None else read_json("--strokes", strokes),

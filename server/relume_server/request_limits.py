@@ -30,8 +30,8 @@ UPLOADS = (
     "/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry",
 )  # fmt: skip
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and its form
-# documents with many looks, of those who may render them
-LARGER = ("/api/renders", "/api/renders/looks")
+# documents with many looks, and reference pictures, of those who may render
+LARGER = ("/api/renders", "/api/renders/looks", "/api/solve")
 MAX_JSON_BYTES = 1024**2
 """Limit of all other bodies. JSON is parsed on the event loop at about 40 MB per second, which blocks all others."""
 MAX_LOGIN_BYTES = 4 * 1024

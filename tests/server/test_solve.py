@@ -10,6 +10,7 @@ from problems import parse_problem
 from session_client import Baked
 
 from relume.image_io.write_image import png_bytes
+from relume_server.request_limits import MAX_JSON_BYTES
 
 KEY_LIGHT = {"kind": "point", "intensity": 1.0}
 LEFT, RIGHT = [[40.0, 48.0]], [[120.0, 48.0]]
@@ -79,6 +80,13 @@ def test_without_a_target_nothing_changes(client: TestClient, baked: Baked) -> N
     answer = solve(client, baked)
     assert (answer["patch"], answer["changes"], answer["shortfalls"]) == ([], [], [])
     assert answer["look"] == {"lights": {"Key": KEY_LIGHT}}
+
+
+def test_a_reference_picture_may_be_larger_than_other_documents(client: TestClient, baked: Baked) -> None:
+    noise = np.random.default_rng(1).integers(0, 255, (800, 1200, 3), np.uint8)
+    picture = png_bytes(noise)
+    assert len(picture) > MAX_JSON_BYTES
+    assert solve(client, baked, reference={"image": encoded(picture)})["residual"] > 0
 
 
 def test_materials_follow_by_request(client: TestClient, baked: Baked) -> None:

@@ -115,7 +115,7 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     Editor(page).wait_until_exact()
     (bake,) = server.call(f"/api/bakes?scene={scene}")
     assert bake["recipe"]["views"] == ["Beside"]
-    assert bake["recipe"]["cameras"] == [{key: after[key] for key in ("name", "to_world", "yfov", "near")}]
+    assert bake["recipe"]["cameras"] == [{key: after[key] for key in ("name", "to_world", "yfov", "near", "lens")}]
 
 
 def placed(cameras: list[dict[str, Any]]) -> dict[str, Any]:

@@ -159,7 +159,7 @@ function OpenBar() {
           checked={changesMaterials.value}
           onChange={(event) => (changesMaterials.value = event.currentTarget.checked)}
         />
-        Materials
+        Also the materials
       </label>
       <Reference />
       <button title="Close (Esc)" onClick={toggleMatch}>

@@ -217,8 +217,13 @@ export function endStroke(): void {
   current.isEnded = true;
   if (!changesMaterials.peek()) return sendGesture(current);
   void reportErrors(async () => {
-    const materials = await paintedMaterials(current);
-    if (gesture.peek() === current) sendGesture(current, materials);
+    try {
+      const materials = await paintedMaterials(current);
+      if (gesture.peek() === current) sendGesture(current, materials);
+    } catch (error) {
+      if (gesture.peek() === current) stopGesture();
+      throw error;
+    }
   });
 }
 
