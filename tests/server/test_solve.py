@@ -83,7 +83,7 @@ def test_without_a_target_nothing_changes(client: TestClient, baked: Baked) -> N
 
 
 def test_a_reference_picture_may_be_larger_than_other_documents(client: TestClient, baked: Baked) -> None:
-    noise = np.random.default_rng(1).integers(0, 255, (800, 1200, 3), np.uint8)
+    noise = np.random.default_rng(1).integers(0, 255, (600, 700, 3), np.uint8)
     picture = png_bytes(noise)
     assert len(picture) > MAX_JSON_BYTES
     assert solve(client, baked, reference={"image": encoded(picture)})["residual"] > 0
