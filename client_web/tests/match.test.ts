@@ -10,6 +10,7 @@ import {
   matchStatus,
   resultText,
   strokeKind,
+  toggleMatch,
 } from "../src/panels/lights/match/match";
 import { isMatchOpen, lockedPointers, toggleLock } from "../src/state/match";
 import type { SolveBody, SolveRequest } from "../src/protocol";
@@ -89,6 +90,21 @@ describe("a stroke", () => {
     extendStroke([20, 10]);
     await settle();
     expect(requests.at(-1)?.look?.["environment"]).toEqual(LOOK.environment);
+  });
+
+  test("stays if the next one begins, or the tool closes, before its last answer", async () => {
+    beginStroke("front", [10, 10], 4);
+    await settle();
+    endStroke();
+    beginStroke("front", [40, 10], 4);
+    expect(history.steps.value).toHaveLength(1);
+    extendStroke([60, 10]);
+    await settle();
+    endStroke();
+    toggleMatch();
+    await settle();
+    expect(history.steps.value).toHaveLength(2);
+    expect(look.value?.environment.intensity).toBe(3);
   });
 
   test("is canceled by Escape, which closes the tool if there is none", async () => {

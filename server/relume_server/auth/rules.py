@@ -48,6 +48,8 @@ RULES: Mapping[str, Mapping[str, Role]] = {
     "/api/color": {"GET": VIEW},
     "/api/color/{config}/lut": {"GET": VIEW},
     "/api/models": {"GET": VIEW},
+    "/api/models/principled": {"POST": VIEW},
+    "/api/models/principled/terms": {"POST": VIEW},
     "/api/models/zernike-fit": {"POST": VIEW},
     "/api/models/albedo": {"POST": VIEW},
     "/api/materials": {"GET": VIEW},

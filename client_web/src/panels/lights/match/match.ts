@@ -186,9 +186,9 @@ const LABELS: Record<StrokeKind, string> = {
 };
 
 function beginGesture(view: string, label: string, points: ImagePoint[], radius: number): Gesture | null {
+  finishGesture();
   const before = look.peek();
   if (before === null) return null;
-  stopGesture();
   return (gesture.value = { label, view, before, points, radius, isEnded: false });
 }
 
@@ -250,6 +250,13 @@ function stopGesture(): void {
   cancelPreview();
 }
 
+/** Keep what an ended stroke has found so far, whose last answer may come later; cancel one that has not ended. */
+function finishGesture(): void {
+  if (!gesture.peek()?.isEnded) return stopGesture();
+  gesture.value = null;
+  commitPreview();
+}
+
 /** Escape: cancel the stroke, or close the tool if there is none. */
 export function cancelMatch(): void {
   if (!isMatchOpen.peek()) return;
@@ -262,7 +269,7 @@ export function cancelMatch(): void {
 
 export function toggleMatch(): void {
   batch(() => {
-    stopGesture();
+    finishGesture();
     isMatchOpen.value = !isMatchOpen.value;
   });
 }
