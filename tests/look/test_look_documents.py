@@ -26,10 +26,12 @@ def test_default_look_has_every_field(default):
     }  # fmt: skip
     plain = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "link": None, "shadow_link": None}
     spot = {"kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -1.0, 0.0], "cone": [20.0, 30.0]}
+    spot |= {"rotation": 0.0, "profile": None, "gobo": None}
     panel = {"kind": "mesh", "material": "Teapot", "image": None, "emission": [5.0, 5.0, 4.0]}
     assert default["lights"] == {"Key": {**plain, **spot, "emission": [1.0, 1.0, 1.0]}, "Panel": {**plain, **panel}}
     assert default["transport"] == {"show": "all", "bounces": 24}
-    assert default["display"] == {"exposure": 0.0, "tone_map": "agx", "temperature": 6500.0, "tint": 0.0, "lut": None}
+    balance = {"temperature": 6500.0, "tint": 0.0, "contrast": 1.0}
+    assert default["display"] == {"exposure": 0.0, "tone_map": "agx", **balance, "lut": None}
     assert json.loads(json.dumps(default)) == default
     assert complete(default, default) == default
 
