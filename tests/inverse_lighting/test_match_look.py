@@ -190,6 +190,7 @@ def test_shadow_catchers_are_refused(gathered, render):
         load_sources(look.model_copy(update={"materials": {**look.materials, "Floor": floor}}), render)
 
 
+@pytest.mark.slow
 def test_the_rotation_of_the_environment_comes_back(gathered, render, tmp_path):
     look, wanted = look_of(gathered), look_of(gathered, environment={"rotation": 130.0, "intensity": 0.5})
     data = exr_bytes(render(wanted), tmp_path)

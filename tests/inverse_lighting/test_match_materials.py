@@ -66,7 +66,7 @@ def picture_request(image, folder, **fields):
     return MatchRequest(reference=(folder / "a.exr").read_bytes(), **fields)
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.02, marks=pytest.mark.slow)])
 def test_lights_and_two_materials_of_a_picture_come_back(gathered, render, tmp_path, noise):
     look, wanted = look_of(gathered), look_of(gathered, key=3.0, red=(0.2, 0.4, 0.6), exponent=80.0)
     picture = render(wanted)

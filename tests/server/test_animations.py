@@ -103,6 +103,7 @@ def test_turntable_rotates_the_object_or_the_environment(
     assert response.json()["cameras"] is None
 
 
+@pytest.mark.slow
 def test_camera_path_interpolates_cameras_and_looks(
     client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
@@ -257,6 +258,7 @@ def test_listed_looks_are_those_that_are_rendered(
         np.testing.assert_array_equal(actual, expected)
 
 
+@pytest.mark.slow
 def test_listed_cameras_are_those_that_are_rendered(
     client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:

@@ -37,7 +37,8 @@ def test_defaults_are_optional_in_inputs_only() -> None:
 
 def test_look_type_is_complete() -> None:
     text = typescript.generate_look()
-    kinds = ("Point", "Spot", "Directional", "Rectangle", "Disc", "Sphere", "Tube", "Mesh", "Points", "Panels")
+    single = ("Point", "Spot", "Directional", "Rectangle", "Disc", "Sphere", "Tube", "Mesh")
+    kinds = (*single, "Points", "Panels", "Directionals", "Surfaces")
     assert f"  lights: Record<string, {' | '.join(f'{kind}Look' for kind in kinds)}>;" in text
     assert "  texture: string | null;" in text
     assert "  shadow_catcher?: boolean;" in text

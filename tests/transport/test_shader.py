@@ -142,6 +142,7 @@ def test_lobes_narrower_than_the_light_spacing_preserve_energy(model, params):
     assert error(actual, alone) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_narrow_lobe_within_wide_lights_is_shaded():
     few, (term, bands) = tessellate_environment(studio(), 200), curves_of("cook_torrance", {"sigma": 0.01})
     receivers = everything_visible(ref.make_random_receivers(4, few.num_lights, seed=4), few)

@@ -88,6 +88,7 @@ def counted(images):
     return read
 
 
+@pytest.mark.slow
 def test_a_resumed_compression_gives_the_same_result(tmp_path):
     images, polled = Facets(kinds=9), []
     expected = compressed(images)
@@ -204,6 +205,7 @@ def test_each_coder_reports_the_error_of_what_it_stores(coder, tmp_path):
     np.testing.assert_array_equal(loaded.weight, fewer.weight)
 
 
+@pytest.mark.slow
 def test_the_smaller_of_both_coders_is_taken():
     """Whole BRDFs for a plane; clusters per view if texels of different views have nothing in common."""
     flat = Facets(kinds=9, size=(24, 24))

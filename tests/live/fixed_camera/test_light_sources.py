@@ -71,7 +71,7 @@ def pixel_centers(scene: Scene, side: int) -> tuple[np.ndarray, np.ndarray]:
     return inside, position[inside]
 
 
-@pytest.mark.parametrize("num_lights", [65, 1000])
+@pytest.mark.parametrize("num_lights", [65, pytest.param(1000, marks=pytest.mark.slow)])
 def test_an_imported_picture_is_lit_by_all_lights_of_the_file(num_lights: int, tmp_path: Any) -> None:
     scene, lights = lit_file(num_lights)
     assert [light.fields["kind"] for light in scene.lights] == ["points", "points"]
