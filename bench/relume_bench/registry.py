@@ -285,14 +285,9 @@ GROUPS = (
             "estimators.connect_all",
         ),
     ),
-    Group(
-        "relume_bench.light_groups",
-        (
-            "lights.groups_ms",
-            "lights.groups_rmse_1000",
-            "lights.groups_rmse_10000",
-        ),
-    ),
+    Group("relume_bench.light_groups", ("lights.groups_ms",), arguments=("lights.groups_ms",)),
+    Group("relume_bench.light_groups", ("lights.groups_rmse_1000",), arguments=("lights.groups_rmse_1000",)),
+    Group("relume_bench.light_groups", ("lights.groups_rmse_10000",), arguments=("lights.groups_rmse_10000",)),
     Group(
         "relume_bench.lights",
         (
