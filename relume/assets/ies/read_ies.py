@@ -108,7 +108,7 @@ def _count(values: F64, index: int, label: str, quantity: str) -> int:
     """Return a number of angles. Raises SceneError if it is none."""
     value = values[index] if index < len(values) else float("nan")
     if not (1 <= value <= MAX_ANGLES and value == int(value)):
-        raise SceneError(f"{label} has {value:.10g} {quantity}, it must be 1 to {MAX_ANGLES}; export the file again")
+        raise SceneError(f"{label} has {value:.7g} {quantity}, it must be 1 to {MAX_ANGLES}; export the file again")
     return int(value)
 
 
