@@ -22,6 +22,9 @@ TO_XYZ = np.array(
 )
 """CIE 1931 XYZ of linear Rec. 709; white is D65 (IEC 61966-2-1)."""
 
+LUMENS_PER_WATT = 683.0
+"""Luminous efficacy of green light at 555 nm, by which photometric units become watts."""
+
 
 def luminance(rgb: Shaped[F32, "*batch 3"]) -> F32:
     """Luminance Y of linear Rec. 709 RGB, for each pixel."""

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.color import LUMENS_PER_WATT
 from relume.core.filesystem import atomic_write
 from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial, emissive_surface
@@ -27,7 +28,6 @@ from relume.look.model import AreaLook, SingleLightLook
 from relume.raytrace.tangents import any_tangent, unit
 from relume.scene.model import WRAPS, Camera, Mesh
 from relume.scene_io.gltf.lights import EXTENSION as PUNCTUAL
-from relume.scene_io.gltf.lights import LUMENS_PER_WATT
 from relume.scene_io.gltf.variants import EXTENSION as VARIANTS
 from relume.scene_io.surfaces.surface_images import ImageInput
 

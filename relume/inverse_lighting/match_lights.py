@@ -28,9 +28,9 @@ class Match:
 
     Attributes:
         changes: changed fields by the JSON pointers of their sources. stops: change of their luminance; None from or to
-            black. image: its radiance. residual: relative RMS error of the marked
-            pixels; `residual_before`: that of the current look. error: the same of all pixels
-            with weight, also those that are to stay. shortfalls: regions that are not reached.
+            black. image: its radiance. shortfalls: regions that are not reached.
+        residual: relative RMS error of the marked pixels; `residual_before`: that of the current look. error: the same
+            of all pixels with weight, also those that are to stay.
     """
 
     changes: dict[str, dict[str, Any]]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 
-import jsonpatch
 import numpy as np
 import pytest
+from matched_looks import matched, relative_error
 from PIL import Image
 from session_edits import make_look
 
@@ -18,8 +18,6 @@ from relume.inverse_lighting.match_look import MatchRequest, match_look
 from relume.inverse_lighting.painting import Stroke
 from relume.inverse_lighting.reference_picture import read_reference
 from relume.inverse_lighting.sources import load_sources
-from relume.look import Look
-from relume.output.render_image import render_image
 
 LIGHTS = {
     "Key/1": {"kind": "point", "position": [0.5, 1.3, 0.5], "emission": [2.0, 1.5, 1.0]},
@@ -52,28 +50,6 @@ WANTED = {
     "fill": {"intensity": 0.4},
     "environment": {"intensity": 0.6, "color": [0.5, 0.75, 1.0]},
 }
-
-
-@pytest.fixture(scope="module")
-def render(gathered):
-    images = {}
-
-    def render(look):
-        key = look.model_dump_json(exclude={"display"})
-        if key not in images:
-            images[key] = render_image(gathered, "front", look)
-        return images[key]
-
-    return render
-
-
-def matched(look, result):
-    """The look after the operations of a match."""
-    return Look.model_validate(jsonpatch.apply_patch(look.model_dump(mode="json"), result.operations))
-
-
-def relative_error(image, reference):
-    return np.linalg.norm(image - reference) / np.linalg.norm(reference)
 
 
 def exr_bytes(image, folder):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import jsonpatch
 import numpy as np
 import pytest
+from matched_looks import matched, relative_error
 from session_edits import make_look
 
 from relume.brdf.registry import TERMS
@@ -21,8 +21,6 @@ from relume.inverse_lighting.material_parameters import (
 from relume.inverse_lighting.painting import Stroke, painted_target
 from relume.inverse_lighting.report import residual
 from relume.inverse_lighting.solve import Target
-from relume.look import Look
-from relume.output.render_image import render_image
 
 KEY = {"kind": "point", "position": [0.5, 1.3, 0.5], "emission": [2.0, 1.5, 1.0]}
 SIZE = 30, 40
@@ -37,27 +35,6 @@ def look_of(transfer, *, key=1.0, red=(0.8, 0.1, 0.1), exponent=30.0):
         document["materials"]["Floor"]["terms"][1]["params"]["exponent"] = exponent
 
     return make_look(transfer, change)
-
-
-@pytest.fixture(scope="module")
-def render(gathered):
-    images = {}
-
-    def render(look):
-        key = look.model_dump_json(exclude={"display"})
-        if key not in images:
-            images[key] = render_image(gathered, "front", look)
-        return images[key]
-
-    return render
-
-
-def matched(look, result):
-    return Look.model_validate(jsonpatch.apply_patch(look.model_dump(mode="json"), result.operations))
-
-
-def relative_error(image, reference):
-    return np.linalg.norm(image - reference) / np.linalg.norm(reference)
 
 
 def picture_request(image, folder, **fields):

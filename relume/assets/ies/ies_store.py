@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from relume.assets.asset_store import AssetStore
 from relume.assets.ies.read_ies import AZIMUTHS, POLAR_ANGLES, read_ies
 from relume.core.cache import asset_cached
+from relume.core.color import LUMENS_PER_WATT
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, warning_of
 from relume.core.validation import Pointer, invalid_value
@@ -26,7 +27,6 @@ from relume.core.validation import Pointer, invalid_value
 F32 = NDArray[np.float32]
 
 IES_FILES = AssetStore("IES file", "ies:", "ies.json", SceneError, max_entries=1_000)
-LUMENS_PER_WATT = 683.0
 _WEB = "web.npy"
 
 

@@ -14,6 +14,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from relume.core.color import LUMENS_PER_WATT
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.collect_lights import LightCollector
@@ -25,7 +26,6 @@ from relume.scene_io.import_options import LightUnit
 F64 = NDArray[np.float64]
 
 EXTENSION = "KHR_lights_punctual"
-LUMENS_PER_WATT = 683.0
 _DIM = 20.0  # candela: 0.4 W in a file in candela, 250 W in one in W/sr
 _MAX_DEFINITIONS = 10_000
 _UNITS = approximated(f"Light strengths converted from candela/lux to watts ({LUMENS_PER_WATT:g} lm/W).")

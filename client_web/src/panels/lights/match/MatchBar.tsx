@@ -1,4 +1,5 @@
 /** Bar of the match tool: kind of stroke, brush, reference picture, locks, and the result as text. */
+import type { Signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { fromHex, toHex } from "../../../render/color/colorMath";
 import { isMatchOpen } from "../../../state/match";
@@ -72,33 +73,33 @@ function Reference() {
           <button title="Match the whole picture to the reference" onClick={matchPicture}>
             Match
           </button>
-          <label title="Only the relative brightness of the reference picture counts">
-            <input
-              type="checkbox"
-              checked={fitsExposure.value}
-              onChange={(event) => (fitsExposure.value = event.currentTarget.checked)}
-            />
-            Any exposure
-          </label>
-          <label title="Colors of lights may change, too">
-            <input
-              type="checkbox"
-              checked={changesColor.value}
-              onChange={(event) => (changesColor.value = event.currentTarget.checked)}
-            />
-            Colors
-          </label>
-          <label title="Also search the rotation of the environment; takes seconds">
-            <input
-              type="checkbox"
-              checked={rotatesEnvironment.value}
-              onChange={(event) => (rotatesEnvironment.value = event.currentTarget.checked)}
-            />
-            Rotate environment
-          </label>
+          <Choice
+            label="Any exposure"
+            title="Only the relative brightness of the reference picture counts"
+            choice={fitsExposure}
+          />
+          <Choice label="Colors" title="Colors of lights may change, too" choice={changesColor} />
+          <Choice
+            label="Rotate environment"
+            title="Also search the rotation of the environment; takes seconds"
+            choice={rotatesEnvironment}
+          />
         </>
       )}
     </>
+  );
+}
+
+function Choice({ label, title, choice }: { label: string; title: string; choice: Signal<boolean> }) {
+  return (
+    <label title={title}>
+      <input
+        type="checkbox"
+        checked={choice.value}
+        onChange={(event) => (choice.value = event.currentTarget.checked)}
+      />
+      {label}
+    </label>
   );
 }
 
@@ -153,14 +154,11 @@ function OpenBar() {
         onChange={(value) => (brushRadius.value = value)}
       />
       <MatchLock label="environment" pointer={ENVIRONMENT_POINTER} />
-      <label title="When a stroke ends, also change the materials painted on; takes seconds">
-        <input
-          type="checkbox"
-          checked={changesMaterials.value}
-          onChange={(event) => (changesMaterials.value = event.currentTarget.checked)}
-        />
-        Also the materials
-      </label>
+      <Choice
+        label="Also the materials"
+        title="When a stroke ends, also change the materials painted on; takes seconds"
+        choice={changesMaterials}
+      />
       <Reference />
       <button title="Close (Esc)" onClick={toggleMatch}>
         Close

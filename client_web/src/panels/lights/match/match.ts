@@ -9,6 +9,7 @@ import { LatestRequest } from "../../../session/net/latestRequest";
 import { requestPixelProbe } from "../../../session/pixelProbe";
 import { bake } from "../../../state/bakes";
 import { changeByPatch } from "../../../state/document/jsonPatch";
+import { jsonPointer } from "../../../state/document/pointer";
 import { look } from "../../../state/look";
 import { isMatchOpen, lockedPointers } from "../../../state/match";
 import { activeViewName } from "../../../state/views";
@@ -120,13 +121,12 @@ function baseRequest(view: string, current: Look): SolveRequest | null {
 /** True for the environment and for lights that are on: others are no sources. */
 function isLockable(current: Look, pointer: string): boolean {
   if (pointer === ENVIRONMENT_POINTER) return true;
-  return Object.entries(current.lights).some(([name, light]) => light.enabled && lightPointer(name) === pointer);
+  return Object.entries(current.lights).some(
+    ([name, light]) => light.enabled && jsonPointer("lights", name) === pointer,
+  );
 }
 
 export const ENVIRONMENT_POINTER = "/environment";
-function lightPointer(name: string): string {
-  return `/lights/${name.replace(/~/g, "~0").replace(/\//g, "~1")}`;
-}
 
 function referenceBody(): Pick<SolveRequest, "reference"> {
   const picture = referencePicture.peek();
