@@ -7,6 +7,7 @@ correction must never take the image further from the exact one. The context has
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -47,7 +48,10 @@ class _Ratios(NamedTuple):
 def measure(tiny: bool) -> list[Figure]:
     """Bake each scene, stop at each camera."""
     sizes, steps = FreeCameraSizes.choose(tiny), (0.0,) if tiny else _STEPS
-    by_scene = {name: np.array(list(_measure_scene(scene, sizes, steps))) for name, scene in free_camera_scenes(sizes)}
+    by_scene: dict[str, NDArray[np.float64]] = {}
+    for name, scene in free_camera_scenes(sizes):
+        by_scene[name] = np.array(list(_measure_scene(scene, sizes, steps)))
+        print(f"{name}: {by_scene[name][:, 0].max():.3f}", file=sys.stderr, flush=True)
     rmse, flip = np.concatenate(list(by_scene.values())).T
     context = {
         "pictures": len(rmse), "median": float(np.median(rmse)),
