@@ -1,8 +1,10 @@
-"""solve.error…: lights found from a picture of known lights; solve.ms: time of one solution for 20 lights.
+"""solve.error…: lights and materials found from a picture; solve.ms: time of one solution for 20 lights.
 
-The Cornell box with direct light, 640×480, 20 point lights of random intensities and colors; the match starts with
-equal white ones. The error is that of the picture with the lights that were found, without noise and with 2 % noise in
-the target, relative RMS over all pixels of the small images that a session solves with.
+The Cornell box with direct and indirect light, and 20 point lights. The picture has random intensities and colors of
+the lights, another color of a wall, and another color and width of the floor's highlight. The match starts with equal
+white lights and the materials of the scene, and may change the lights and these two materials. The error is that of the
+picture after the match, without noise and with 2 % noise in the target, relative RMS over all pixels of the small
+images that a session solves with. The context has the error when the materials stay.
 """
 
 from __future__ import annotations
@@ -16,16 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
+from relume.image_io.write_image import write_image
 from relume.inverse_lighting.match_lights import match_lights
-from relume.inverse_lighting.match_look import REFERENCE_RIDGE
+from relume.inverse_lighting.match_look import MatchRequest, match_look
 from relume.inverse_lighting.painting import Stroke, brush_mask, painted_target
-from relume.inverse_lighting.solve import Target
-from relume.inverse_lighting.sources import Sources, load_sources
+from relume.inverse_lighting.sources import RenderLook, Sources, load_sources, merge_changes
+from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.opened.openers import open_transfer
-from relume.look import validate
+from relume.look import Look, complete, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_small
-from relume.scene.examples.cornell import cornell_box
+from relume.scene.examples.cornell import GLOSSY_FLOOR, cornell_box
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
@@ -33,6 +36,8 @@ from relume_bench.figure import Figure
 F32 = NDArray[np.float32]
 _NOISE = 0.02
 _WIDTH = 160
+_VIEW = "front"
+_MATERIALS = frozenset({"Red wall", "Floor"})
 _NUM_TIMED = 20
 
 
@@ -40,43 +45,57 @@ def measure(tiny: bool) -> list[Figure]:
     """Errors of the picture without and with noise, and the median time of a stroke's solution."""
     rng, num_lights, size = np.random.default_rng(0), 4 if tiny else 20, (64, 48) if tiny else (640, 480)
     with tempfile.TemporaryDirectory() as folder:
-        sources = _load_sources(Path(folder), num_lights, size, rng)
-    strengths = rng.uniform(0.0, 3.0, (len(sources.pointers), 3))
-    picture = sources.image(strengths)
-    context = {"lights": num_lights, "size": list(size), "solved_size": list(picture.shape[1::-1])}
-    noise = 1.0 + _NOISE * rng.standard_normal(picture.shape)
-    return [
-        Figure("solve.error", _error(sources, picture, picture), "relative RMS", context),
-        Figure(
-            "solve.error_noisy",
-            _error(sources, (picture * noise).astype(np.float32), picture),
-            "relative RMS",
-            {**context, "noise": _NOISE},
-        ),
-        Figure("solve.ms", _stroke_ms(sources), "ms", context),
-    ]
+        transfer = _bake(Path(folder), size)
+
+        def render(look: Look) -> F32:
+            return render_small(transfer, _VIEW, look, _WIDTH)
+
+        start, target = _looks(transfer.default_look, num_lights, rng)
+        picture = render(target)[..., :3]
+        context = {"lights": num_lights, "size": list(size), "solved_size": list(picture.shape[1::-1])}
+        figures = []
+        for name, noise in (("solve.error", 0.0), ("solve.error_noisy", _NOISE)):
+            noisy = picture * (1.0 + noise * rng.standard_normal(picture.shape))
+            with_lights, with_materials = (
+                _error(start, render, noisy.astype(np.float32), picture, Path(folder), materials)
+                for materials in (frozenset[str](), _MATERIALS)
+            )
+            lights_alone = {**context, "noise": noise, "materials": sorted(_MATERIALS), "lights_alone": with_lights}
+            figures.append(Figure(name, with_materials, "relative RMS", lights_alone))
+        sources = load_sources(start, render)
+    return [*figures, Figure("solve.ms", _stroke_ms(sources), "ms", context)]
 
 
-def _load_sources(folder: Path, num_lights: int, size: tuple[int, int], rng: np.random.Generator) -> Sources:
-    recipe = Recipe("direct", ("front",), size, 20)
-    transfer = open_transfer(
-        bake_in_process(METHODS["direct"], cornell_box(), recipe, folder / "direct.zarr"), Cache(4 << 30)
+def _bake(folder: Path, size: tuple[int, int]) -> FixedViewTransfer:
+    recipe = Recipe("gather", (_VIEW,), size, 20)
+    return open_transfer(
+        bake_in_process(METHODS["gather"], cornell_box(is_floor_glossy=True), recipe, folder / "gather.zarr"),
+        Cache(4 << 30),
     )
-    lights: dict[str, Any] = {
-        f"Light {k}": {"kind": "point", "position": rng.uniform([-0.8, 0.2, -0.8], [0.8, 1.8, 0.8]).tolist()}
-        for k in range(num_lights)
+
+
+def _looks(default_look: dict[str, Any], num_lights: int, rng: np.random.Generator) -> tuple[Look, Look]:
+    """The look that the match starts with, and that of the picture."""
+    positions = rng.uniform([-0.8, 0.2, -0.8], [0.8, 1.8, 0.8], (num_lights, 3))
+    emissions = rng.uniform(0.0, 3.0, (num_lights, 3))
+    lights = [{"kind": "point", "position": position.tolist()} for position in positions]
+    wall, floor = {"terms": [{"model": "lambert", "color": [0.1, 0.2, 0.6]}]}, [dict(term) for term in GLOSSY_FLOOR]
+    floor[1] |= {"color": [0.2, 0.1, 0.05], "params": {"exponent": 30.0}}
+    start = {"lights": {f"Light {k}": light for k, light in enumerate(lights)}}
+    target = {
+        "lights": {f"Light {k}": {**light, "emission": emissions[k].tolist()} for k, light in enumerate(lights)},
+        "materials": {"Red wall": wall, "Floor": {"terms": floor}},
     }
-    look = validate({"lights": lights}, transfer.default_look)
-    return load_sources(look, lambda single: render_small(transfer, "front", single, _WIDTH))
+    return validate(complete(start, default_look), default_look), validate(complete(target, default_look), default_look)
 
 
-def _error(sources: Sources, target: F32, picture: F32) -> float:
-    whole = painted_target([], picture, Target(target, np.ones(target.shape[:2], np.float32)))
-    match = match_lights(sources, whole, ridge=REFERENCE_RIDGE)
-    strengths = sources.strengths
-    for pointer, fields in match.changes.items():
-        strengths[sources.pointers.index(pointer)] = np.multiply(fields["intensity"], fields.get("color", 1.0))
-    return float(np.linalg.norm(sources.image(strengths) - picture) / np.linalg.norm(picture))
+def _error(look: Look, render: RenderLook, target: F32, picture: F32, folder: Path, materials: frozenset[str]) -> float:
+    """Match a look to a target, and compare its image with the picture."""
+    write_image(folder / "target.exr", target)
+    request = MatchRequest(reference=(folder / "target.exr").read_bytes(), materials=materials)
+    match = match_look(look, render, request)
+    after = Look.model_validate(merge_changes(look.model_dump(mode="json"), match.operations))
+    return float(np.linalg.norm(render(after)[..., :3] - picture) / np.linalg.norm(picture))
 
 
 def _stroke_ms(sources: Sources) -> float:
