@@ -51,7 +51,8 @@ from relume.scene_io.obj_ply.weld import compile_kernels
 from relume.store.bake_protocol import BakeMethod, Recipe
 from relume.store.run_bake import bake_in_process
 
-SIZE, NUM_LIGHTS, NUM_PROBES = (64, 48), 256, 4000  # enough lights to be grouped
+SIZE, NUM_LIGHTS, NUM_PROBES, NUM_PATCHES, NUM_RAYS = (16, 12), 256, 300, 300, 64  # enough lights to be grouped
+LARGER_SIZE = 64, 48  # of a free camera: with edges and edges of shadows
 CACHE_BYTES = 1 << 28
 ANALYTIC = tuple(model for model, term in TERMS.items() if not term.needs_data)
 # the first has no angle, the second has an angle with a parameter: rays distinguish no more cases
@@ -65,7 +66,7 @@ _POLISHED_ROUGHNESS = (0.1, 0.09)
 def precompile() -> None:
     """Bake with every method, edit each analytic term by each curve and parameter, add and move local lights.
 
-    Cost: a minute and a half of two cores, 20 s when everything is compiled.
+    Cost: a minute and a half of two cores, 15 s when everything is compiled.
     """
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         pictures = pool.submit(_compile_pictures)
@@ -107,7 +108,10 @@ def _temporary_scene() -> Iterator[tuple[Scene, Path]]:
 
 def _exercise(method: BakeMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
     """Bake, open, edit terms of some models, and move everything that can move."""
-    recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_probes=NUM_PROBES)
+    recipe = Recipe(
+        method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS,
+        num_probes=NUM_PROBES, num_patches=NUM_PATCHES, gather_rays=None if method.name == "direct" else NUM_RAYS,
+    )  # fmt: skip
     transfer: Any = open_bake(
         bake_in_process(method, scene, recipe, folder / f"{method.name}.zarr"), Cache(CACHE_BYTES)
     )
@@ -177,7 +181,7 @@ def _move_cameras(transfer: BakedFreeCamera, picture: FreeCameraPicture) -> None
     picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
     picture.advance(None)
     picture.advance(None)
-    picture.set_camera(picture.sized_camera[0], (2 * SIZE[0], 2 * SIZE[1]))
+    picture.set_camera(picture.sized_camera[0], LARGER_SIZE)
     picture.advance(None)
     zero_coefficients, all_probes = (
         np.zeros(transfer.vectors_shape, np.float32),

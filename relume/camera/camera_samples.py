@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
-from scipy.stats.qmc import Sobol
 
 from relume.camera.edge_detection import (
     find_edge_pixels,
@@ -228,6 +227,8 @@ def sobol_points(
     Args:
         pixel, width, num: see `stratified_facets`. num_dimensions: of the points.
     """
+    from scipy.stats.qmc import Sobol  # half a second to import, and few scenes need it
+
     side = FROST_PERIOD
     points = Sobol(num_dimensions, scramble=False).random(side**2 * num) + 0.5 / (side**2 * num)
     y, x = np.divmod(pixel, width)

@@ -1,4 +1,4 @@
-"""A bake with fewer pixels: every `step`-th pixel of every `step`-th row, for small images of large bakes.
+"""A bake with fewer pixels: the middle one of each `step` × `step` pixels, for small images of large bakes.
 
 Shading takes the same time per sample, so a thumbnail of all samples would take as long as the full image.
 """
@@ -21,8 +21,9 @@ class DownsampledStore:
         width, height = store.attributes["size"]
         y, x = np.divmod(store.read(f"views/{view}/pixel"), width)
         self._store, self._prefix = store, f"views/{view}/"
-        self._sample_rows = np.flatnonzero((x % step == 0) & (y % step == 0))
-        columns, rows = -(-width // step), -(-height // step)
+        left, top = (min(step // 2, side - 1) for side in (width, height))
+        self._sample_rows = np.flatnonzero((x % step == left) & (y % step == top))
+        columns, rows = -(-(width - left) // step), -(-(height - top) // step)
         self._pixel: NDArray[np.uint32] = (y // step * columns + x // step)[self._sample_rows].astype(np.uint32)
         self._attributes = {**store.attributes, "size": [columns, rows]}
 

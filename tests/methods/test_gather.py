@@ -427,9 +427,8 @@ def test_a_downsampled_bake_has_the_same_light(gathered, monkeypatch):
     few = Picture(transfer.downsampled("front", step), "front", Cache(BUDGET))
     for picture in (whole, few):  # no look with stored images
         picture.set_look(make_look(transfer, lambda document: document["transport"].update(bounces=5)))
-    np.testing.assert_allclose(
-        run_until_exact(few).image(), run_until_exact(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6
-    )
+    remaining = run_until_exact(whole).image()[step // 2 :: step, step // 2 :: step]
+    np.testing.assert_allclose(run_until_exact(few).image(), remaining, rtol=1e-4, atol=1e-6)
 
 
 def test_a_rotation_is_previewed_with_its_indirect_light(gathered, monkeypatch):

@@ -16,7 +16,7 @@ def test_remaining_pixels_equal_those_of_the_whole_image(transfer, view, step):
     look = make_look(transfer)
     whole = render_image(transfer, view, look)
     small = render_image(transfer.downsampled(view, step), view, look)
-    np.testing.assert_allclose(small, whole[::step, ::step], rtol=2e-5, atol=1e-6)
+    np.testing.assert_allclose(small, whole[step // 2 :: step, step // 2 :: step], rtol=2e-5, atol=1e-6)
 
 
 def test_area_lights_on_remaining_pixels_equal_the_whole_image(gathered):
@@ -32,13 +32,13 @@ def test_area_lights_on_remaining_pixels_equal_the_whole_image(gathered):
     whole = render_image(gathered, "front", look)
     small = render_image(gathered.downsampled("front", 3), "front", look)
     assert whole.max() > 0.1
-    np.testing.assert_allclose(small, whole[::3, ::3], rtol=2e-5, atol=1e-6)
+    np.testing.assert_allclose(small, whole[1::3, 1::3], rtol=2e-5, atol=1e-6)
 
 
 def test_a_small_image_has_at_least_the_requested_width(transfer):
     look = make_look(transfer)
     widths = {width: render_small(transfer, "front", look, width).shape[1] for width in (10, 20, 32, 40, 64, 500)}
-    assert widths == {10: 11, 20: 22, 32: 32, 40: 64, 64: 64, 500: 64}
+    assert widths == {10: 11, 20: 21, 32: 32, 40: 64, 64: 64, 500: 64}
 
 
 def test_downsampled_views_store_nothing(baked):
