@@ -4,7 +4,7 @@ The Cornell box with direct and indirect light, and 20 point lights. The picture
 the lights, another color of a wall, and another color and width of the floor's highlight. The match starts with equal
 white lights and the materials of the scene, and may change the lights and these two materials. The error is that of the
 picture after the match, without noise and with 2 % noise in the target, relative RMS over all pixels of the small
-images that a session solves with. The context has the error when the materials stay.
+images that a session solves with; the target has the size of the bake. The context has the error if materials stay.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.opened.openers import open_transfer
 from relume.look import Look, complete, validate
 from relume.methods.registry import METHODS
-from relume.output.render_image import render_small
+from relume.output.render_image import render_image, render_small
 from relume.scene.examples.cornell import GLOSSY_FLOOR, cornell_box
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
@@ -51,13 +51,13 @@ def measure(tiny: bool) -> list[Figure]:
             return render_small(transfer, _VIEW, look, _WIDTH)
 
         start, target = _looks(transfer.default_look, num_lights, rng)
-        picture = render(target)[..., :3]
-        context = {"lights": num_lights, "size": list(size), "solved_size": list(picture.shape[1::-1])}
+        picture, small = render_image(transfer, _VIEW, target)[..., :3], render(target)[..., :3]
+        context = {"lights": num_lights, "size": list(size), "solved_size": list(small.shape[1::-1])}
         figures = []
         for name, noise in (("solve.error", 0.0), ("solve.error_noisy", _NOISE)):
             noisy = picture * (1.0 + noise * rng.standard_normal(picture.shape))
             with_lights, with_materials = (
-                _error(start, render, noisy.astype(np.float32), picture, Path(folder), materials)
+                _error(start, render, noisy.astype(np.float32), small, Path(folder), materials)
                 for materials in (frozenset[str](), _MATERIALS)
             )
             lights_alone = {**context, "noise": noise, "materials": sorted(_MATERIALS), "lights_alone": with_lights}
@@ -90,7 +90,7 @@ def _looks(default_look: dict[str, Any], num_lights: int, rng: np.random.Generat
 
 
 def _error(look: Look, render: RenderLook, target: F32, picture: F32, folder: Path, materials: frozenset[str]) -> float:
-    """Match a look to a target, and compare its image with the picture."""
+    """Match a look to a target of full size, and compare its small image with that of the picture."""
     write_image(folder / "target.exr", target)
     request = MatchRequest(reference=(folder / "target.exr").read_bytes(), materials=materials)
     match = match_look(look, render, request)

@@ -7,26 +7,26 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.image_io.downsample import downsample
 from relume.inverse_lighting.match_lights import Match, match_lights
 from relume.inverse_lighting.match_materials import match_materials
 from relume.inverse_lighting.painting import PaintedTarget, Stroke, painted_target
 from relume.inverse_lighting.reference_picture import match_exposure, read_reference
 from relume.inverse_lighting.rotation import best_rotation
-from relume.inverse_lighting.solve import RIDGE
+from relume.inverse_lighting.solve import RIDGE, Target, average_blocks
 from relume.inverse_lighting.sources import (
     ENVIRONMENT_POINTER,
     RenderLook,
     Sources,
     load_sources,
+    look_without_lights,
     pointer_of,
     replace_operations,
 )
 from relume.look import Look
 
+F32 = NDArray[np.float32]
 REFERENCE_RIDGE = 1e-6
 """λ for a picture: its pixels tell apart what a stroke leaves open."""
 _REFERENCE_BLOCK = 4
@@ -79,10 +79,13 @@ def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMat
         EditError: the look's image is not linear in its lights. SceneError: the reference picture cannot be read.
         ParameterError: the request does not fit the look.
     """
-    render = render if request.reference is None else _averaged(render)
+    reference = None
+    if request.reference is not None:
+        reference = read_reference(request.reference, look.display, _size(render(look_without_lights(look))))
+        reference, render = reference.averaged(_REFERENCE_BLOCK), _averaged(render, reference.weights)
     sources = load_sources(look, render)
     before = sources.image(sources.strengths)
-    painted = _painted(look, before, request)
+    painted = _painted(before, request, reference)
     ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
 
     def match(sources: Sources) -> Match:
@@ -101,15 +104,9 @@ def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMat
     return _look_match(look, after, match(load_sources(after, render)))
 
 
-def _averaged(render: RenderLook) -> RenderLook:
+def _averaged(render: RenderLook, weights: F32) -> RenderLook:
     """Return a function that renders images of averaged blocks."""
-
-    def render_averaged(look: Look) -> Shaped[NDArray[np.float32], "height width channels"]:
-        image = render(look)
-        height, width = (max(1, side // _REFERENCE_BLOCK) for side in image.shape[:2])
-        return downsample(image, (width, height))
-
-    return render_averaged
+    return lambda look: average_blocks(render(look), weights, _REFERENCE_BLOCK)
 
 
 def _look_match(look: Look, after: Look, match: Match) -> LookMatch:
@@ -127,13 +124,14 @@ def _rotated(look: Look, rotation: float) -> Look:
     return look.model_copy(update={"environment": environment})
 
 
-def _painted(look: Look, image: Any, request: MatchRequest) -> PaintedTarget:
-    size = image.shape[1], image.shape[0]
-    strokes, reference = request.strokes(size), None
-    if request.reference is not None:
-        reference = read_reference(request.reference, look.display, size)
-        if request.fits_exposure:
-            marks = [stroke.mask for stroke in strokes if stroke.kind == "reference"]
-            weights = np.max(marks, axis=0) if marks else np.ones(image.shape[:2], np.float32)
-            reference = match_exposure(reference, image, weights)
+def _painted(image: F32, request: MatchRequest, reference: Target | None) -> PaintedTarget:
+    strokes = request.strokes(_size(image))
+    if request.fits_exposure and reference is not None:
+        marks = [stroke.mask for stroke in strokes if stroke.kind == "reference"]
+        weights = np.max(marks, axis=0) if marks else np.ones(image.shape[:2], np.float32)
+        reference = match_exposure(reference, image, weights)
     return painted_target(strokes, image, reference)
+
+
+def _size(image: F32) -> Size:
+    return image.shape[1], image.shape[0]

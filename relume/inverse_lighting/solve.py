@@ -19,6 +19,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from relume.core.errors import ParameterError, ShapeMismatchError
+from relume.image_io.downsample import downsample
 from relume.inverse_lighting.sources import Sources
 from relume.look.light_validation import MAX_INTENSITY
 
@@ -27,6 +28,7 @@ F64 = NDArray[np.float64]
 RIDGE = 1e-4
 _RELATIVE_ROUNDING = 1e-12
 MAX_RADIANCE = 1e9
+_LEAST_WEIGHT = np.float32(1e-4)
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,24 @@ class Target:
 
     radiance: Shaped[F32, "height width 3"]
     weights: Shaped[F32, "height width"]
+
+    def averaged(self, side: int) -> Target:
+        """Return the target of averaged blocks of pixels."""
+        coverage = downsample(self.weights[..., None], _block_size(self.weights, side))[..., 0]
+        return Target(average_blocks(self.radiance, self.weights, side), coverage)
+
+
+def average_blocks(
+    image: Shaped[F32, "height width channels"], weights: Shaped[F32, "height width"], side: int
+) -> Shaped[F32, "rows columns channels"]:
+    """Average an image over blocks of about `side` × `side` pixels; pixels without weight count where no other is."""
+    size, some = _block_size(weights, side), np.maximum(weights, _LEAST_WEIGHT)[..., None]
+    return np.asarray(downsample(image * some, size) / downsample(some, size), np.float32)
+
+
+def _block_size(image: F32, side: int) -> tuple[int, int]:
+    height, width = (max(1, round(pixels / side)) for pixels in image.shape[:2])
+    return width, height
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from relume.inverse_lighting.match_look import MatchRequest, match_look
 from relume.inverse_lighting.painting import Stroke
 from relume.inverse_lighting.reference_picture import read_reference
 from relume.inverse_lighting.sources import load_sources
+from relume.output.render_image import render_image, render_small
 
 LIGHTS = {
     "Key/1": {"kind": "point", "position": [0.5, 1.3, 0.5], "emission": [2.0, 1.5, 1.0]},
@@ -78,6 +79,20 @@ def test_the_lights_of_a_picture_come_back(gathered, render, tmp_path, backgroun
     assert after.lights["Off"] == look.lights["Off"]
 
 
+def test_a_picture_of_full_size_matches_small_images(gathered, tmp_path):
+    """Small images are samples of the picture, whose edges and highlights are averages in a reference."""
+    look, wanted = look_of(gathered), look_of(gathered, **WANTED)
+
+    def render(look):
+        return render_small(gathered, "front", look, 20)
+
+    result = match_look(
+        look, render, MatchRequest(reference=exr_bytes(render_image(gathered, "front", wanted), tmp_path))
+    )
+    assert result.match.residual < 0.06  # 0.10 without averages
+    assert matched(look, result).lights["Key/1"].intensity == pytest.approx(3.0, rel=0.1)
+
+
 @pytest.mark.parametrize("tone", ["none", "agx", "filmic"])
 def test_the_tone_map_of_the_view_is_inverted(gathered, render, tone):
     look, wanted = look_of(gathered, tone=tone), look_of(gathered, tone=tone, **WANTED)
@@ -100,9 +115,13 @@ def test_a_picture_counts_only_in_its_strokes(gathered, render, tmp_path):
     look, wanted = look_of(gathered), look_of(gathered, **WANTED)
     picture = render(wanted).copy()
     picture[:, 20:] = 100.0
-    left = np.zeros(picture.shape[:2], np.float32)
-    left[:, :20] = 1.0
-    request = MatchRequest(lambda size: [Stroke("reference", left)], exr_bytes(picture, tmp_path))
+
+    def left_half(size):
+        mask = np.zeros(size[::-1], np.float32)
+        mask[:, : size[0] // 2] = 1.0
+        return [Stroke("reference", mask)]
+
+    request = MatchRequest(left_half, exr_bytes(picture, tmp_path))
     assert match_look(look, render, request).match.residual < 0.02
 
 
