@@ -46,7 +46,7 @@ def assets(tmp_path_factory):
             "one side": ies_text(np.roll(cosine_web(2, POLAR, AZIMUTH[:-1]), 20, axis=0), POLAR, AZIMUTH[:-1]),
         }.items():
             (folder / f"{name}.ies").write_text(text)
-            names[name] = store_ies(webs, folder / f"{name}.ies", name).profile
+            names[name] = store_ies(webs, folder / f"{name}.ies", name).reference
         colored = checker()
         colored[:32, :32] = 255, 20, 0
         colored[32:, 40:] = 0, 90, 255

@@ -210,8 +210,8 @@ def _material_rows(
     """Rows of each material; −1 for none. (materials · (2 groups + 2), 4) int32
 
     Per group: its isotropic and anisotropic table, 1 if it reflects, its texture. Then its lobe, its normal map, 1 for
-    a shadow catcher, 1 if it emits to both sides. Then the bits of its emission, and its emission texture. Then per group
-    both tables of the environment in highlights, and both of other light.
+    a shadow catcher, 1 if it emits to both sides. Then the bits of its emission, and its emission texture. Then per
+    group both tables of the environment in highlights, and both of other light.
     """
     tables, lobes, is_reflective = materials.tables, materials.lobes, materials.is_reflective
     material_textures = transfer.stored_scene_with(materials.overrides).textures.material_textures
