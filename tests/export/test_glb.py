@@ -348,7 +348,6 @@ def test_report_lists_display_settings(display: dict[str, Any], setting: str | N
     assert listed == ([] if setting is None else [f"The {setting} of the display is not exported."])
 
 
-
 def test_extras_have_the_error(tmp_path: Path) -> None:
     scene = scene_of(Material("Tray", ({"model": "ward", "color": [0.5] * 3},)))
     document = written(tmp_path / "a.glb", scene)

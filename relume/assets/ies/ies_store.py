@@ -14,12 +14,13 @@ import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.assets.ies.ies_file import IesFile
 from relume.assets.ies.read_ies import AZIMUTHS, POLAR_ANGLES, read_ies
 from relume.assets.small_asset_store import SmallAssetRecord, SmallAssetStore
 from relume.core.cache import asset_cached
@@ -44,18 +45,6 @@ class IesRecord(SmallAssetRecord):
 
 IES_FILES = SmallAssetStore("IES file", "ies:", "ies.json", SceneError, max_entries=1_000, record_type=IesRecord)
 _WEB, _SOURCE = "web.npy", "source.ies"
-
-
-class IesFile(NamedTuple):
-    """An IES file that a scene's lights use. name: shown to users."""
-
-    name: str
-    data: bytes
-
-    @property
-    def profile(self) -> str:
-        """Its name in lights, once it is stored."""
-        return IES_FILES.name_of(self.data)
 
 
 def store_ies(folder: Path, source: Path, name: str) -> IesRecord:
