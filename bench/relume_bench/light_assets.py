@@ -34,7 +34,7 @@ def light_assets(folder: Path) -> Iterator[dict[str, str]]:
         ies.write_text(_ies_text())
         field = np.indices((_FIELDS, _FIELDS)).sum(axis=0) % 2
         Image.fromarray(_COLORS[field].repeat(_FIELD_PIXELS, axis=0).repeat(_FIELD_PIXELS, axis=1)).save(gobo)
-        yield {"ies": store_ies(webs, ies, "Web").profile, "gobo": store(images, gobo, "Gobo").texture}
+        yield {"ies": store_ies(webs, ies, "Web").reference, "gobo": store(images, gobo, "Gobo").texture}
 
 
 def mitsuba_texture(folder: Path, light: dict[str, Any]) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def environment_import(
 
     check_readable("FILE", file)
     record = store_environment(environments_path(open_settings(data).data), file, check_name(name or file.stem))
-    document = {"id": record.id, "map": record.map, "name": record.name, "warnings": list(record.warnings)}
-    print_result(document, record.map, as_json=as_json)
+    document = {"id": record.id, "map": record.reference, "name": record.name, "warnings": list(record.warnings)}
+    print_result(document, record.reference, as_json=as_json)
     for warning in record.warnings:
         typer.echo(f"warning: {warning}", err=True)

@@ -159,7 +159,7 @@ export interface PanelsLook {
   source: string;
 }
 
-/** A point light that emits equally in all directions; emission is radiant intensity, W/sr. `profile`: an uploaded IES file, "ies:<id>", by which it emits: intensity is emission times the file's over its maximum. `direction`: its nadir. `rotation`: of its C0 plane about that, degrees. None: equally in all directions. */
+/** A point light that emits equally in all directions; emission is radiant intensity, W/sr. `profile`: an uploaded IES file, "ies:<id>", by which it emits: intensity is emission times the file's over its maximum. `direction`: its nadir. `rotation`: of its C0 about that, degrees; at 0, C0 of a light that points down is +X, C90 −Z. None: equally in all directions. */
 export interface PointLook {
   intensity: number;
   color: [number, number, number];

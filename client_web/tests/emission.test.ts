@@ -1,9 +1,10 @@
 import { describe, expect, test } from "vitest";
 import { luminance } from "../src/render/color/tonemap";
-import { emissionForWatts, LUMENS_PER_WATT, unitsOf, wattsOf } from "../src/panels/lights/power";
+import { emissionForWatts, LUMENS_PER_WATT, quantitiesOf, wattsOf } from "../src/panels/lights/power";
 import { planckian } from "../src/render/color/planckian";
 import { withKelvin, kelvinOf, rgbOfKelvin } from "../src/panels/lights/temperature";
 import type { Light } from "../src/protocol";
+import { parseFactor, stopsOf } from "../src/ui/stops";
 
 const common = { intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1] } as const;
 const light = (fields: object) => ({ ...common, ...fields }) as unknown as Light;
@@ -40,7 +41,7 @@ describe("the power of a light", () => {
       3 * luminance([0, 1, 0]),
       9,
     );
-    expect(unitsOf(light({ kind: "directional" })).lumens).toBe("lx");
+    expect(quantitiesOf(light({ kind: "directional" })).map(({ lumens }) => lumens)).toEqual(["lx"]);
   });
 
   test("a bulb of 806 lumens has them after they were typed", () => {
@@ -54,6 +55,32 @@ describe("the power of a light", () => {
     expect(emissionForWatts(light({ kind: "directional", emission: [0, 0, 0] }), 2)).toEqual([2, 2, 2]);
     expect(emissionForWatts(light({ kind: "point", intensity: 0 }), 2)).toBeNull();
   });
+});
+
+test("area lights have nits beside lumens, whatever their kind and size", () => {
+  for (const fields of [
+    { kind: "rectangle", size: [2, 0.5] },
+    { kind: "disc", radius: 0.3 },
+    { kind: "sphere", radius: 0.3 },
+    { kind: "tube", radius: 0.02, length: 1.2 },
+  ]) {
+    const panel = light({ ...fields, emission: [3, 3, 3], intensity: 2 });
+    const [power, luminanceOf] = quantitiesOf(panel);
+    expect([power?.lumens, luminanceOf?.lumens]).toEqual(["lm", "cd/m²"]);
+    const perWatt = luminanceOf?.perWatt ?? 0;
+    expect(LUMENS_PER_WATT * perWatt * wattsOf(panel)).toBeCloseTo(683 * 6, 6);
+    const emission = emissionForWatts(panel, 1000 / LUMENS_PER_WATT / perWatt); // 1,000 nits typed
+    expect((emission?.[1] ?? 0) * 2 * LUMENS_PER_WATT).toBeCloseTo(1000, 1);
+  }
+  expect(quantitiesOf(light({ kind: "mesh", material: "Panel" })).map(({ lumens }) => lumens)).toEqual(["cd/m²"]);
+});
+
+test("factors are typed in stops", () => {
+  expect(["+1 EV", "-2ev", "\u22120.5 EV", "0 EV", "3", "1,5"].map(parseFactor)).toEqual([
+    2, 0.25, 0.707107, 1, 3, 1.5,
+  ]);
+  expect(["EV", "x EV", "", "1 stop"].map(parseFactor)).toEqual([null, null, null, null]);
+  expect(stopsOf(8)).toBe(3);
 });
 
 describe("the temperature of a light", () => {

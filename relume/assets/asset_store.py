@@ -95,6 +95,10 @@ class AssetStore:
         """The id of a file's content."""
         return _digest(source)[:ID_DIGITS]
 
+    def name_of(self, content: bytes) -> str:
+        """The name in looks of an asset from a file with this content."""
+        return self.prefix + hashlib.sha256(content).hexdigest()[:ID_DIGITS]
+
     def store(self, folder: Path, source: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> str:
         """Store an asset under the hash of its file, and return its id; an existing asset gets the new name.
 

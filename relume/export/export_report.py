@@ -8,6 +8,8 @@ from typing import Any
 from relume.core.import_warnings import quote
 from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial
+from relume.image_io.contrast import NEUTRAL_CONTRAST
+from relume.image_io.white_balance import NEUTRAL_TEMPERATURE
 from relume.look.model import AreaLook
 
 
@@ -83,10 +85,12 @@ def omitted_from_scene_files(export: ExportDocument) -> tuple[str, ...]:
     display, transport = export.look.display, export.look.transport
     sentences = {
         "Area lights become visible emissive meshes.": any(isinstance(light, AreaLook) for _, light in export.lights()),
-        "IES files and gobos of lights are not exported.": any(
-            getattr(light, "profile", None) or getattr(light, "gobo", None) for _, light in export.lights()
-        ),
+        "Gobos of lights are not exported.": any(getattr(light, "gobo", None) for _, light in export.lights()),
         "Exposure and tone mapping are settings of the program that opens the file.": display.exposure != 0,
+        "The white balance of the display is not exported.": (display.temperature, display.tint)
+        != (NEUTRAL_TEMPERATURE, 0),
+        "The contrast of the display is not exported.": display.contrast != NEUTRAL_CONTRAST,
+        "The LUT of the display is not exported.": display.lut is not None,
         "All light paths are exported, not only those that the look shows.": transport.show != "all",
         "Variants replace materials; lights and environment are those of the exported look.": bool(export.variants),
     }

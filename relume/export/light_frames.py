@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.lights.light_axes import light_axes
 from relume.lights.local_lights import rectangle
 from relume.lights.shape_triangles import shape_triangles
-from relume.look.model import AreaLook, RectangleLook, SingleLightLook, TubeLook
+from relume.look.model import AreaLook, PointLook, RectangleLook, SingleLightLook, SpotLook, TubeLook
 from relume.raytrace.tangents import any_tangent
 
 F32 = NDArray[np.float32]
@@ -18,11 +19,16 @@ F64 = NDArray[np.float64]
 
 
 def light_frame(light: SingleLightLook) -> Shaped[F64, "4 4"]:
-    """Return the transform to world of a light other than an emissive mesh, rigid. A tube lies along its X."""
+    """Return the transform to world of a light other than an emissive mesh, rigid. A tube lies along its X, C0 of an
+    IES file is +X and C90 +Y.
+    """
     position = getattr(light, "position", (0.0, 0.0, 0.0))
     if isinstance(light, RectangleLook):
         across, up = rectangle(light.geometry)[1]
         return _frame(-across / np.linalg.norm(across), up / np.linalg.norm(up), position)
+    if isinstance(light, PointLook | SpotLook):
+        c0, c270, _ = light_axes(light.direction, light.rotation)
+        return _frame(c0, -c270, position)
     backward = -np.array(getattr(light, "direction", (0.0, 0.0, -1.0)), np.float64)
     backward /= np.linalg.norm(backward)
     right = any_tangent(backward[None].astype(np.float32))[0].astype(np.float64)

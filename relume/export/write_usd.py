@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment_names import load_environment
+from relume.assets.ies.ies_store import IES_FILES, load_web, read_source
+from relume.assets.ies.read_ies import mean_intensity
 from relume.core.errors import SceneError
 from relume.core.filesystem import UNFINISHED, atomic_write
 from relume.core.import_warnings import quote
@@ -32,6 +34,7 @@ _FOCAL_LENGTH = 0.5  # 50 mm in tenths of a meter
 _DEFAULT_ASPECT = 4 / 3
 _CLIPPING = 1e-3, 1e6  # meters
 _POINT_RADIUS = 1e-3
+_IES_FOLDER = "ies"
 _DOME_TURN = 90.0  # the middle of an image faces +Z in USD, and +X in an environment
 _UP = np.array([[0, 1, 0]], np.float32)
 
@@ -41,6 +44,12 @@ def omitted_from_usd(export: ExportDocument) -> tuple[str, ...]:
     materials = export.all_materials()
     names = ", ".join(dict.fromkeys(quote(m.name) for m in materials if omitted_from_preview(m)))
     sentences = [sentence for material in materials for sentence in omitted_from_open_pbr(material)]
+    profiles = [(name, getattr(light, "profile", None)) for name, light in export.lights()]
+    sentences += [
+        f"The IES file of {quote(name)} is not exported; upload it again."
+        for name, profile in profiles
+        if profile is not None and read_source(profile) is None
+    ]
     if names:
         sentences.append(f"Programs that read UsdPreviewSurface alone show {names} simplified.")
     return tuple(sentences)
@@ -176,6 +185,8 @@ class _StageWriter:
             prim.CreateTreatAsPointAttr(True)
             prim.CreateNormalizeAttr(True)
             strength *= 4  # radiance L / (4 π r²) of a section π r²
+        if light.kind in ("point", "spot") and light.profile is not None:
+            strength *= self._ies_file(prim, light.profile)
         if light.kind == "spot":
             shaping = UsdLux.ShapingAPI.Apply(prim.GetPrim())
             inner, outer = light.cone
@@ -186,6 +197,21 @@ class _StageWriter:
         prim.CreateColorAttr(color)
         _transform(prim, light_frame(light))
         return prim
+
+    def _ies_file(self, prim: Any, profile: str) -> float:
+        """Write the IES file of a light; return the mean of its intensity over the maximum."""
+        from pxr import UsdLux
+
+        source, web = read_source(profile), load_web(profile)
+        if source is None:
+            return 1.0
+        file = f"{profile.removeprefix(IES_FILES.prefix)}.ies"
+        (self._folder / _IES_FOLDER).mkdir(exist_ok=True)
+        (self._folder / _IES_FOLDER / file).write_bytes(source)
+        shaping = UsdLux.ShapingAPI.Apply(prim.GetPrim())
+        shaping.CreateShapingIesFileAttr(f"{_IES_FOLDER}/{file}")
+        shaping.CreateShapingIesNormalizeAttr(True)
+        return mean_intensity(web)
 
     def _area_light(self, path: Any, light: AreaLook) -> Any:
         from pxr import UsdLux

@@ -251,21 +251,28 @@ def source_triangles(lights: Sequence[Mapping[str, Any]], center: Shaped[F64, " 
     corners, radiance = [], []
     for light in lights:
         geometry = LightGeometry(**{field: value for field, value in light.items() if field != "emission"})
-        triangles = _area_triangles(geometry, center, radius)
+        triangles, _ = area_triangles(geometry, center, radius)
         corners.append(triangles.corners)
         radiance.append(triangles.relative_radiance * np.float32(light["emission"][0]))
     return LightTriangles(np.concatenate(corners), np.concatenate(radiance), is_two_sided=False)
 
 
-def _area_triangles(geometry: LightGeometry, center: Shaped[F64, " 3"], radius: float) -> LightTriangles:
+def area_triangles(
+    geometry: LightGeometry, center: Shaped[F64, " 3"], radius: float
+) -> tuple[LightTriangles, LightGeometry]:
+    """Return the triangles of an area light or a sun disk, and its geometry, which has an angle if it is a sun.
+
+    Args:
+        geometry: the light. center, radius: see `source_triangles`.
+    """
     if geometry.kind == "directional":
         geometry = geometry._replace(angle=max(geometry.angle, _MIN_SUN_ANGLE))
     triangles = shape_triangles(geometry) or sun_triangles(geometry, center, radius)
     if triangles is not None:
-        return triangles
+        return triangles, geometry
     corner, (e, f) = rectangle(geometry)
     halves = np.array([(corner, corner + e, corner + e + f), (corner, corner + e + f, corner + f)], np.float32)
-    return LightTriangles(halves, np.ones(2, np.float32), is_two_sided=False)
+    return LightTriangles(halves, np.ones(2, np.float32), is_two_sided=False), geometry
 
 
 def _cones(cone: Shaped[F64, "M 2"]) -> tuple[F64, F64]:

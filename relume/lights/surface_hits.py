@@ -17,8 +17,8 @@ F64 = NDArray[np.float64]
 
 
 def has_surface(geometry: LightGeometry) -> bool:
-    """True for a light with a surface that is no mesh of the scene: `surface_distance` finds it."""
-    return geometry.kind in ("rectangle", "disc", "sphere", "tube") or geometry.angle > 0
+    """True for a light, or lights of a source, with a surface that is no mesh of the scene."""
+    return geometry.kind in ("rectangle", "disc", "sphere", "tube", "panels", "directionals") or geometry.angle > 0
 
 
 def surface_radiance(geometry: LightGeometry) -> float:
@@ -29,7 +29,7 @@ def surface_radiance(geometry: LightGeometry) -> float:
 def surface_distance(
     geometry: LightGeometry, origin: Shaped[F32, "m 3"], direction: Shaped[F32, "m 3"]
 ) -> Shaped[F64, " m"]:
-    """Distance to the emitting side of a light with a surface, meters; infinite for a miss, 1e30 for a sun disk.
+    """Distance to the emitting side of a single light with a surface, meters; infinite for a miss, 1e30 for a sun disk.
 
     Args:
         geometry: the light. origin: of the rays, meters. direction: unit vectors.

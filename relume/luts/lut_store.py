@@ -16,35 +16,22 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.asset_store import AssetStore
+from relume.assets.small_asset_store import SmallAssetRecord, SmallAssetStore
 from relume.core.cache import asset_cached
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, warning_of
 
 U16 = NDArray[np.uint16]
 
-LUTS = AssetStore("LUT", "lut:", "lut.json", SceneError, max_entries=500)
-_TABLE = "table.npy"
-
 
 @dataclass(frozen=True)
-class LutRecord:
-    """A LUT in lists.
+class LutRecord(SmallAssetRecord):
+    """A LUT in lists. size: nodes per channel."""
 
-    Attributes:
-        created: seconds since 1970. size: nodes per channel. warnings: warnings about the import, one sentence each.
-    """
-
-    id: str
-    name: str
-    created: float
     size: int
-    warnings: tuple[ImporterWarning, ...]
 
-    @property
-    def lut(self) -> str:
-        """Name of the LUT in looks."""
-        return LUTS.prefix + self.id
+
+LUTS = SmallAssetStore("LUT", "lut:", "lut.json", SceneError, max_entries=500, record_type=LutRecord)
+_TABLE = "table.npy"
 
 
 def store_lut(folder: Path, source: Path, name: str) -> LutRecord:
@@ -61,24 +48,9 @@ def store_lut(folder: Path, source: Path, name: str) -> LutRecord:
 
     def fill(staged_folder: Path) -> dict[str, Any]:
         np.save(staged_folder / _TABLE, table)
-        return {"size": len(table), "warnings": [warning.document() for warning in warnings]}
+        return {"size": len(table)}
 
-    return get_record(folder, LUTS.store(folder, source, name, fill))
-
-
-def records(folder: Path) -> list[LutRecord]:
-    """Return all LUTs of a folder, newest first."""
-    return LUTS.records(folder, get_record)
-
-
-def get_record(folder: Path, identity: str) -> LutRecord:
-    """Return one LUT. Raises NotFoundError; SceneError if its files are damaged."""
-    path = LUTS.path(folder, identity)
-    document = LUTS.load_record(path)
-    size, warnings = document.get("size"), document.get("warnings")
-    if not isinstance(size, int) or not isinstance(warnings, list):
-        raise LUTS.damaged_error(path)
-    return LutRecord(identity, document["name"], document["created"], size, tuple(map(warning_of, warnings)))
+    return LUTS.import_asset(folder, source, name, warnings, fill)
 
 
 def load_table(name: str) -> Shaped[U16, "N N N 3"]:

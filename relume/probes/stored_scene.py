@@ -42,6 +42,7 @@ class PixelArrays(NamedTuple):
     face_normal: Shaped[F32, "faces 3"]
     uv_scale: Shaped[F32, " faces"]
     node_normal: Shaped[F32, "nodes 3"]
+    is_two_sided: Shaped[NDArray[np.bool_], " materials"]
 
 
 class ViewedProbes(NamedTuple):
@@ -69,6 +70,7 @@ class StoredScene:
         uv_faces: corners of the triangles among
             `uvs`.
         face_normal: unit, on the side from which the corners are counterclockwise. uv_scale: texture units per meter.
+        is_two_sided: of each material, whether it emits to both sides.
     """
 
     probe_grid: ProbeGrid
@@ -83,12 +85,13 @@ class StoredScene:
     uv_scale: Shaped[F32, " faces"]
     textures: Textures
     uv_faces: Shaped[NDArray[np.uint32], "faces 3"]
+    is_two_sided: Shaped[NDArray[np.bool_], " materials"]
 
     def pixel_arrays(self) -> PixelArrays:
         """Return what the kernel of pixels reads."""
         return PixelArrays(
             self.textures, self.uvs, self.tangents, self.faces, self.uv_faces, self.face_material, self.face_normal,
-            self.uv_scale, self.lattice_nodes.normal,
+            self.uv_scale, self.lattice_nodes.normal, self.is_two_sided,
         )  # fmt: skip
 
     def viewed_from(
@@ -147,6 +150,7 @@ def read_stored_scene(store: StoreReader) -> StoredScene:
         *face_fields,
         read_textures(store),
         face_fields[2],
+        np.array(store.attributes["double_sided"], np.bool_),
     )
     has_maps = bool((surface.textures.material_textures[:, NORMAL_MAP] >= 0).any())
     if has_maps and len(surface.tangents) != len(surface.uvs):

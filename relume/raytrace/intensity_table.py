@@ -1,9 +1,10 @@
 """Intensity of a point light over directions: an IES web, the projection of a gobo, or their product, as a table.
 
-    J(θ, φ) = web(θ, φ) · gobo(u, v) / mean,   u, v = ½ − tan θ (cos φ, sin φ) / (2 tan θ_outer)
+    J(θ, φ) = web(θ, −φ) · gobo(u, v) / mean,   u, v = ½ − tan θ (cos φ, sin φ) / (2 tan θ_outer)
 
 θ is measured from the light's direction, φ about it, from the horizontal axis of `relume.lights.light_axes` toward the
-upright one. The gobo fills the square about the cone, upright and unmirrored along the direction.
+upright one, clockwise as seen along it. Azimuths C of a web are counterclockwise as seen from behind the light, that is
+from above a luminaire, so C = −φ. The gobo fills the square about the cone, upright and unmirrored along the direction.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def intensity_table(
         return np.ones((1, 1), np.float32) if gobo is None else gobo
     shape = (_WEB_POLAR_ANGLES, web.shape[1]) if gobo is None else gobo.shape
     polar, azimuth = _grid(outer, *shape)
-    rows, columns = polar / np.pi * (web.shape[0] - 1), azimuth / (2 * np.pi) * (web.shape[1] - 1)
+    rows, columns = polar / np.pi * (web.shape[0] - 1), (1 - azimuth / (2 * np.pi)) * (web.shape[1] - 1)
     table = _interpolate_rows(_interpolate_rows(web, rows).T, columns).T
     return np.ascontiguousarray(table if gobo is None else table * gobo, np.float32)
 

@@ -20,11 +20,11 @@ def directional_intensity(light: PointLook | SpotLook, direction: Shaped[F64, "n
 
     direction: away from the light, unit.
     """
-    nadir, c0, c90 = _frame(light)
-    x, y, z = direction @ c0, direction @ c90, direction @ nadir
+    nadir, across, up = _frame(light)
+    x, y, z = direction @ across, direction @ up, direction @ nadir
     intensity = np.ones((*x.shape, 1))
     if light.profile is not None:
-        intensity = intensity * _web_intensity(light.profile, x, y, z)[..., None]
+        intensity = intensity * _web_intensity(light.profile, x, -y, z)[..., None]
     if isinstance(light, SpotLook) and light.gobo is not None:
         # on a plane at distance 1, the image is a square about the circle that the cone cuts out
         half_side = np.tan(np.radians(light.cone[1]))
@@ -47,11 +47,11 @@ def _web_intensity(profile: str, x: F64, y: F64, z: F64) -> F64:
 
 
 def _frame(light: PointLook | SpotLook) -> tuple[F64, F64, F64]:
-    """Direction, and the axes of azimuths 0° and 90°."""
+    """Direction, and the axes of azimuths 0° and 270° of a web, which are the left and the top of a gobo."""
     nadir = np.array(light.direction) / np.linalg.norm(light.direction)
     reference = (0.0, 1.0, 0.0) if np.hypot(nadir[0], nadir[2]) > 1e-3 else (0.0, 0.0, 1.0)
     across = np.cross(reference, nadir)
     across /= np.linalg.norm(across)
     rotation = np.exp(1j * np.radians(light.rotation))
-    c0 = rotation.real * across + rotation.imag * np.cross(nadir, across)
-    return nadir, c0, np.cross(nadir, c0)
+    across = rotation.real * across + rotation.imag * np.cross(nadir, across)
+    return nadir, across, np.cross(nadir, across)

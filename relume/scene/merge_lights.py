@@ -92,7 +92,7 @@ def _equal_lights(lights: Lights) -> list[list[Light]]:
     sources: dict[Any, list[Light]] = {}
     for light in lights:
         kind = _source_kind(light)
-        is_single = not light.group or kind == _SURFACES
+        is_single = not light.group or kind == _SURFACES or light.fields.get("profile") is not None
         key = light.name if is_single else (light.group, kind, _color(light), repr(_links(light)))
         sources.setdefault(key, []).append(light)
     return list(sources.values())
@@ -109,6 +109,8 @@ def _merge_rest(
         dropped = {"link": None, "shadow_link": None}
         lights = [replace(light, fields={**light.fields, **dropped}) for light in lights]
     merged = _merge([replace(light, group="") for light in lights], power, name, new_name)
+    if len(lights) > 1 and any(light.fields.get("profile") is not None for light in lights):
+        warnings.append(approximated(f"{num} {quote(merged.name)} emit without their IES files."))
     num_colors = len(set(map(_color, lights)))
     if num_colors > 1 and kind != _SURFACES:
         text = f"{num} {quote(merged.name)} have {num_colors:,} colors; all get their mean color."

@@ -13,6 +13,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
+from relume.assets.ies.ies_file import IesFile
 from relume.core.import_warnings import ImporterWarning
 from relume.scene.lens import Lens
 from relume.scene.light_members import LightMembers
@@ -187,6 +188,7 @@ class Scene:
         variants: partial looks by name, from the file.
         offset: what was subtracted from the positions of the file, meters with +Y up; zeros unless it was recentered.
         import_options: `relume.scene_io.import_options.ImportOptions` other than the defaults; not part of the id.
+        ies_files: IES files of an import that its lights name; empty once they are stored.
     """
 
     id: str
@@ -200,3 +202,4 @@ class Scene:
     lights: tuple[Light, ...] = ()
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     import_options: dict[str, str] = field(default_factory=dict)
+    ies_files: tuple[IesFile, ...] = ()

@@ -44,7 +44,7 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
         scene.lights,
         scene.offset,
     )
-    return replace(grounded, import_options=scene.import_options)
+    return replace(grounded, import_options=scene.import_options, ies_files=scene.ies_files)
 
 
 def _ball(scene: Scene) -> tuple[F64, float]:

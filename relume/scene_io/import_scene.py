@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from relume.assets.environments.environment import Environment
@@ -51,7 +52,8 @@ def import_scene(
         data, companions = open_zip(data)
     data = to_utf8(data)
     options = options or ImportOptions()
-    return place(_read(data, name, environment, companions, options), options)
+    scene = _read(data, name, environment, companions, options)
+    return replace(place(scene, options), ies_files=scene.ies_files)
 
 
 def _read(

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
-from relume.scene.model import Material
+from relume.scene.model import Light, Material, Scene
 from relume_worker.database import open_database
 from relume_worker.ledger import Ledger
 from relume_worker.scenes import register_scene
@@ -78,6 +78,23 @@ class Server:
             environment=studio(),
             materials=[Material("Ball", (metal,)), Material("Floor", (clay,))],
         )
+        return self._registered(scene)
+
+    def panel_from_behind(self) -> str:
+        """A floor and the back of a one-sided emissive panel, with one bake whose view moves."""
+        clay = {"model": "lambert", "color": [0.8, 0.5, 0.3]}
+        scene = make_tiny_scene(
+            quad("panel", [[-1, 0.2, 0], [1, 0.2, 0], [1, 1.2, 0], [-1, 1.2, 0]], 0),
+            quad("floor", [[-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 0, -3]], 1),
+            camera=make_camera("front", [0, 0.8, -3.2], [0, 0.5, 0], 0.75),
+            environment=studio(),
+            materials=[Material("Panel", (clay,), double_sided=False), Material("Floor", (clay,))],
+        )
+        light = Light("Panel", {"kind": "mesh", "material": "Panel", "emission": [2.0, 4.0, 8.0]})
+        return self._registered(type(scene)(**{**vars(scene), "lights": (light,)}))
+
+    def _registered(self, scene: Scene) -> str:
+        """Register a scene and bake it by few probes."""
         ledger = Ledger(open_database(f"sqlite:///{self.data / 'relume.db'}"))
         register_scene(self.data, ledger, scene)
         ledger.close()

@@ -20,6 +20,7 @@ from relume.export.export_images import ExportImages, color_image
 from relume.export.export_scene import FORMATS, export_report, format_of
 from relume.export.write_glb import write_glb
 from relume.look import Look
+from relume.luts.lut_store import LUTS
 from relume.scene.model import Glass, Light, Material, Scene
 from relume.scene.texture_encoding import decode
 from relume.scene_io.import_options import ImportOptions
@@ -326,6 +327,25 @@ def test_report_lists_fits_and_what_is_missing() -> None:
     assert report.sentences()[0] == f"Material “Tray” is fitted, error {tray.error:.0%}."
     assert any("gray is not part of the file" in sentence for sentence in report.omitted)
     assert any("Exposure" in sentence for sentence in report.omitted)
+
+
+@pytest.mark.parametrize(
+    ("display", "setting"),
+    [
+        ({"temperature": 4000.0}, "white balance"),
+        ({"tint": 5.0}, "white balance"),
+        ({"contrast": 1.2}, "contrast"),
+        ({"lut": "lut:0123456789abcdef"}, "LUT"),
+        ({}, None),
+    ],
+)
+def test_report_lists_display_settings(display: dict[str, Any], setting: str | None, tmp_path: Path) -> None:
+    (tmp_path / "0123456789abcdef").mkdir()
+    with LUTS.with_search_folder(tmp_path):
+        export = export_of(scene_of(Material("Wall", terms_of(PLASTIC))), {"display": display})
+        omitted = export_report(export, FORMATS["glb"]).omitted
+    listed = [sentence for sentence in omitted if "of the display" in sentence]
+    assert listed == ([] if setting is None else [f"The {setting} of the display is not exported."])
 
 
 def test_extras_have_the_error(tmp_path: Path) -> None:

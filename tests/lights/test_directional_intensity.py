@@ -8,6 +8,7 @@ from session_edits import BUDGET
 from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad
 
 from relume.assets.ies.ies_store import IES_FILES, load_web, store_ies
+from relume.assets.ies.read_ies import read_ies
 from relume.brdf.texture_slots import IMAGES
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
@@ -42,9 +43,10 @@ def assets(tmp_path_factory):
         for name, text in {
             "symmetric": ies_text(cosine_web(4, POLAR), POLAR),
             "skew": ies_text(cosine_web(2, POLAR, AZIMUTH), POLAR, AZIMUTH),
+            "one side": ies_text(np.roll(cosine_web(2, POLAR, AZIMUTH[:-1]), 20, axis=0), POLAR, AZIMUTH[:-1]),
         }.items():
             (folder / f"{name}.ies").write_text(text)
-            names[name] = store_ies(webs, folder / f"{name}.ies", name).profile
+            names[name] = store_ies(webs, folder / f"{name}.ies", name).reference
         colored = checker()
         colored[:32, :32] = 255, 20, 0
         colored[32:, 40:] = 0, 90, 255
@@ -76,12 +78,42 @@ def test_a_symmetric_web_is_a_power_of_the_cosine_about_any_direction(assets):
 
 @pytest.mark.parametrize("rotation", [0.0, 90.0, -30.0])
 def test_azimuths_of_a_downward_web_start_at_x_and_rotate(assets, rotation):
-    """C0 is +X, C90 is +Z; a positive rotation turns the web from +X toward +Z."""
+    """C0 is +X; a positive rotation turns the web from +X toward +Z."""
     geometry = LightGeometry("point", POSITION, rotation=rotation, profile=assets["skew"])
     table, away = intensity_table(180, load_web(assets["skew"]), None), directions(2000)
     azimuth = np.arctan2(away[:, 2], away[:, 0]) - np.radians(rotation)
     expected = np.maximum(-away[:, 1], 0) ** 2 * (1 + np.cos(azimuth) / 2) / 1.5
     np.testing.assert_allclose(intensity(geometry, away, table), expected, atol=2e-3)
+
+
+TO_X, TO_Z = "+X -X", "+Z -Z"
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "candela", "bright"),
+    [
+        ((0, 90, 180, 270), (1, 0, 0, 0), "+X"),
+        ((0, 90, 180, 270), (0, 1, 0, 0), "-Z"),
+        ((0, 90, 180, 270), (0, 0, 1, 0), "-X"),
+        ((0, 90, 180, 270), (0, 0, 0, 1), "+Z"),
+        ((0, 90, 180), (1, 0, 0), "+X"),
+        ((0, 90, 180), (0, 1, 0), TO_Z),
+        ((90, 180, 270), (1, 0, 0), "-Z"),
+        ((90, 180, 270), (0, 0, 1), "+Z"),
+        ((90, 180, 270), (0, 1, 0), TO_X),
+        ((0, 90), (1, 0), TO_X),
+        ((0, 90), (0, 1), TO_Z),
+    ],
+)
+def test_azimuths_are_counterclockwise_from_above(azimuth, candela, bright, tmp_path):
+    """A luminaire that points down and emits toward one side: C0 is +X, C90 −Z, C180 −X, C270 +Z."""
+    polar = (0, 90)
+    (tmp_path / "side.ies").write_text(ies_text(np.outer(candela, np.ones(2)), polar, azimuth))
+    web, _ = read_ies(tmp_path / "side.ies", "Side")
+    toward = {"+X": (1, 0), "-X": (-1, 0), "+Z": (0, 1), "-Z": (0, -1)}
+    away = np.array([(x, -1.0, z) for x, z in toward.values()]) / np.sqrt(2)
+    values = intensity(LightGeometry("point", POSITION), away, intensity_table(180, web.relative_intensity, None))
+    np.testing.assert_allclose(values, [float(name in bright) for name in toward], atol=2e-3)
 
 
 def test_a_web_keeps_the_sum_over_all_directions(assets):
@@ -161,6 +193,7 @@ def bake(tmp_path_factory):
 
 LIGHTS = {
     "web": {"kind": "point", "profile": "skew", "direction": [0.4, -1, -0.4], "rotation": 30.0},
+    "web of one side": {"kind": "point", "profile": "one side", "direction": [0.4, -1, -0.4], "rotation": 30.0},
     "web in a cone": {"kind": "spot", "profile": "skew", "cone": [30, 70], "direction": [0.2, -1, -0.6]},
     "gobo": {"kind": "spot", "gobo": "checker", "cone": [40, 50], "direction": [0.2, -1, -0.6], "rotation": 20.0},
     "colored gobo": {"kind": "spot", "gobo": "colored", "cone": [40, 50], "direction": [0.2, -1, -0.6]},

@@ -166,8 +166,8 @@ def test_cones_make_spots() -> None:
     np.testing.assert_allclose(light["emission"], 2 * np.pi * 0.25, rtol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["SphereLight", "RectLight"])
-def test_ies_files_of_any_light_are_a_warning(kind: str) -> None:
+@pytest.mark.parametrize("kind", ["DistantLight", "RectLight"])
+def test_ies_files_of_lights_that_have_none_are_a_warning(kind: str) -> None:
     scene = lit(kind, "asset inputs:shaping:ies:file = @web.ies@", schemas='prepend apiSchemas = ["ShapingAPI"]')
     assert [warning.severity for warning in scene.warnings if "IES file of light" in warning] == ["unsupported"]
 

@@ -15,6 +15,7 @@ import numpy as np
 from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
+from relume.assets.ies.ies_store import store_ies_files
 from relume.core.errors import DiskFullError, NotFoundError
 from relume.core.filesystem import remove_folder
 from relume.core.import_warnings import ImporterWarning, warning_of
@@ -24,7 +25,7 @@ from relume.scene.scene_folder import save_scene
 from relume.scene.triplanar import find_triplanar
 from relume_worker.database.models import CameraRow, SceneRow
 from relume_worker.ledger import Ledger
-from relume_worker.paths import bake_path, scene_path, staging_path
+from relume_worker.paths import bake_path, ies_path, scene_path, staging_path
 from relume_worker.run_marker import delete_run
 from relume_worker.storage import delete_remote, push
 
@@ -71,6 +72,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
     Returns:
         The scene's id.
     """
+    store_ies_files(ies_path(data_dir), scene.ies_files)
     save_scene(scene, scene_path(data_dir, scene.id))
     insert_scene(data_dir, ledger, scene.id, summarize_scene(scene))
     return scene.id

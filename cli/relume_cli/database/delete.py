@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
+from relume_cli.database.small_assets import SmallAssetKind, small_assets
 from relume_cli.options import Data
 from relume_cli.terminal.printing import Json, print_result
 
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
     from relume.assets.measured.measured_store import MaterialRecord
     from relume_cli.database.actions import OpenFolder
 
-Kind = Literal["scene", "bake", "look", "environment", "material", "image", "render", "comparison", "btf-job"]
+Kind = Literal[
+    "scene", "bake", "look", "environment", "material", "image", "ies", "lut", "render", "comparison", "btf-job"
+]
 
 
 class Deletable(NamedTuple):
@@ -37,7 +40,7 @@ def delete(
     """Delete scenes, bakes, looks, assets or jobs.
 
     A server need not stop: sessions that show a deleted bake end with a message. Looks that use a deleted environment,
-    material or image are no longer valid. An image is deleted with those that are derived from it.
+    material, image, IES file or LUT are no longer valid. An image is deleted with those that are derived from it.
     """
     from relume_cli.database.actions import open_data_folder
     from relume_cli.tokens import audit_change
@@ -109,22 +112,24 @@ def _look(data_folder: OpenFolder, name: str) -> Deletable:
     return Deletable(look_name, f"look {look_name!r}", lambda: store.delete(look_name, etag))
 
 
-def _environment(data_folder: OpenFolder, name: str) -> Deletable:
-    from relume.assets.environments.environment_store import STORE, records
-    from relume_cli.name_lookup import pick
-    from relume_worker.paths import environments_path
+def _small_asset(kind: SmallAssetKind, hint: str) -> Callable[[OpenFolder, str], Deletable]:
+    """Return a function that finds an asset. hint: what to do if there is none."""
 
-    folder = environments_path(data_folder.settings.data)
-    candidates = [(record.id, record.name) for record in records(folder)]
-    environment_id = pick(
-        "imported environment", name.removeprefix(STORE.prefix), candidates, "built-in environments cannot be deleted"
-    )
+    def find(data_folder: OpenFolder, name: str) -> Deletable:
+        from relume_cli.name_lookup import pick
 
-    def remove() -> None:
-        STORE.remove(folder, environment_id)
-        data_folder.access.quotas.disown("environment", environment_id)
+        store, folder_of, _ = small_assets(kind)
+        folder = folder_of(data_folder.settings.data)
+        names = {record.id: record.name for record in store.list_records(folder)}
+        identity = pick(store.label, name.removeprefix(store.prefix), list(names.items()), hint)
 
-    return Deletable(environment_id, f"environment {environment_id} ({dict(candidates)[environment_id]})", remove)
+        def remove() -> None:
+            store.remove(folder, identity)
+            data_folder.access.quotas.disown(kind, identity)
+
+        return Deletable(identity, f"{store.label} {identity} ({names[identity]})", remove)
+
+    return find
 
 
 def _material(data_folder: OpenFolder, name: str) -> Deletable:
@@ -186,9 +191,11 @@ FINDERS: dict[Kind, Callable[[OpenFolder, str], Deletable]] = {
     "scene": _scene,
     "bake": _bake,
     "look": _look,
-    "environment": _environment,
+    "environment": _small_asset("environment", "built-in environments cannot be deleted"),
     "material": _material,
     "image": _image,
+    "ies": _small_asset("ies", "upload IES files in the editor"),
+    "lut": _small_asset("lut", "upload LUTs in the editor"),
     "render": _job("render"),
     "comparison": _job("comparison"),
     "btf-job": _job("btf-job"),

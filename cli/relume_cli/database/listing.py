@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from relume_cli.database.jobs import list_jobs
+from relume_cli.database.small_assets import SmallAssetKind, small_assets
 from relume_cli.options import Data
 from relume_cli.terminal.printing import Json, iso_time, print_result
 
@@ -18,7 +19,18 @@ if TYPE_CHECKING:
     from relume_cli.database.actions import OpenFolder
 
 Kind = Literal[
-    "scenes", "bakes", "looks", "environments", "materials", "images", "renders", "comparisons", "btf-jobs", "built-ins"
+    "scenes",
+    "bakes",
+    "looks",
+    "environments",
+    "materials",
+    "images",
+    "ies",
+    "luts",
+    "renders",
+    "comparisons",
+    "btf-jobs",
+    "built-ins",
 ]
 JOB_KINDS = ("renders", "comparisons", "btf-jobs")
 Row = tuple[dict[str, Any], str]
@@ -94,15 +106,16 @@ def _looks(data_folder: OpenFolder) -> Iterator[Row]:
 
 def _environments(data_folder: OpenFolder) -> Iterator[Row]:
     from relume.assets.environments.built_in import BUILT_IN
-    from relume.assets.environments.environment_store import records
-    from relume_worker.paths import environments_path
 
     for name, (label, _) in BUILT_IN.items():
         yield {"id": name, "map": name, "name": label, "created": None, "warnings": []}, f"{name:20}  {label}"
-    for record in records(environments_path(data_folder.settings.data)):
-        created, warnings = iso_time(record.created), list(record.warnings)
-        document = {"id": record.id, "map": record.map, "name": record.name, "created": created, "warnings": warnings}
-        yield document, f"{record.map:20}  {record.name}"
+    yield from _small_assets("environment", data_folder)
+
+
+def _small_assets(kind: SmallAssetKind, data_folder: OpenFolder) -> Iterator[Row]:
+    assets = small_assets(kind)
+    for record in assets.store.list_records(assets.folder(data_folder.settings.data)):
+        yield assets.document(record), f"{record.reference:20}  {record.name}"
 
 
 def _materials(data_folder: OpenFolder) -> Iterator[Row]:
@@ -151,6 +164,8 @@ LISTS: dict[str, Callable[[OpenFolder], Iterator[Row]]] = {
     "environments": _environments,
     "materials": _materials,
     "images": _images,
+    "ies": partial(_small_assets, "ies"),
+    "luts": partial(_small_assets, "lut"),
     "renders": partial(list_jobs, noun="render"),
     "comparisons": partial(list_jobs, noun="comparison"),
     "btf-jobs": partial(list_jobs, noun="btf-job"),

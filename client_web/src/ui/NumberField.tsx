@@ -15,6 +15,8 @@ interface Props {
   autoFocus?: boolean;
   /** Text typed before the field opened. */
   initialText?: string;
+  /** Reads typed text; null if it is invalid. */
+  parse?: (text: string) => number | null;
   onChange: (value: number) => void;
   /** Called when the field is left; `isKeyboard`: by Enter or Escape, so that the focus can move on. */
   onDone?: (isKeyboard: boolean) => void;
@@ -29,6 +31,7 @@ export function NumberField({
   isInteger = false,
   autoFocus,
   initialText,
+  parse = parseNumber,
   onChange,
   onDone,
 }: Props) {
@@ -36,7 +39,7 @@ export function NumberField({
   const [draft, setDraft] = useState<string | null>(initialText ?? null);
   const isRejected = useRef(false);
   const isKeyboard = useRef(false);
-  const wrong = draft !== null && parseNumber(draft) === null;
+  const wrong = draft !== null && parse(draft) === null;
   useLayoutEffect(() => {
     if (!autoFocus) return;
     input.current?.focus();
@@ -48,7 +51,7 @@ export function NumberField({
     onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));
   const submit = () => {
     const typed = draft !== null && draft !== displayedText && !isRejected.current;
-    const next = typed ? parseNumber(draft) : null;
+    const next = typed ? parse(draft) : null;
     if (next !== null) {
       const clamped = Math.min(maximum, Math.max(minimum, next));
       if (clamped !== next)

@@ -3,11 +3,13 @@
 import { useRef, useState } from "preact/hooks";
 import { NumberField } from "./NumberField";
 import { useDrag } from "./drag";
-import { formatNumber, fromFraction, keyStep, snap, toFraction, type NumberRange } from "./scale";
+import { formatNumber, fromFraction, keyStep, parseNumber, snap, toFraction, type NumberRange } from "./scale";
+import { parseFactor } from "./stops";
 
 export interface SliderProps extends NumberRange {
   label: string;
   value: number;
+  /** Factors, "×", may be typed in stops. */
   unit?: string;
   initial?: number;
   tint?: string;
@@ -27,9 +29,9 @@ const STEPS: Record<string, number> = {
 };
 
 /** True if a key starts a typed number. */
-function isNumberKey(event: KeyboardEvent, minimum: number): boolean {
+function isNumberKey(event: KeyboardEvent, isSigned: boolean): boolean {
   if (event.ctrlKey || event.metaKey || event.altKey) return false;
-  return /^[0-9.,]$/.test(event.key) || (event.key === "-" && minimum < 0);
+  return /^[0-9.,]$/.test(event.key) || (event.key === "-" && isSigned);
 }
 
 export function Slider(props: SliderProps) {
@@ -38,6 +40,7 @@ export function Slider(props: SliderProps) {
   const [typing, setTyping] = useState<{ initialText?: string } | null>(null);
   const track = useRef<HTMLDivElement>(null);
   const fraction = toFraction(props, value);
+  const isFactor = unit === "×";
 
   const set = (fraction: number) => {
     drag.current.at = Math.min(1, Math.max(0, fraction));
@@ -72,7 +75,7 @@ export function Slider(props: SliderProps) {
     else if (event.key === "Home") set(0);
     else if (event.key === "End") set(1);
     else if (event.key === "Enter") setTyping({});
-    else if (isNumberKey(event, props.minimum)) begin(event.key);
+    else if (isNumberKey(event, isFactor || props.minimum < 0)) begin(event.key);
     else if ((event.key === "Delete" || event.key === "Backspace") && initial !== undefined) onChange(initial);
     else return;
     event.preventDefault();
@@ -110,6 +113,7 @@ export function Slider(props: SliderProps) {
           minimum={props.minimum}
           maximum={props.maximum}
           step={props.step ?? (props.maximum - props.minimum) / 100}
+          parse={isFactor ? parseFactor : parseNumber}
           autoFocus
           {...typing}
           onChange={(next) => onChange(snap(props, next))}
@@ -122,7 +126,7 @@ export function Slider(props: SliderProps) {
         <button
           type="button"
           class="value"
-          title="Type a value"
+          title={isFactor ? "Type a value, or stops: +1 EV" : "Type a value"}
           aria-label={`${label}: ${valueText}; type a value`}
           onClick={() => setTyping({})}
         >

@@ -9,44 +9,25 @@ Looks refer to one as "env:<id>".
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from relume.assets.asset_store import AssetStore
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.read_environment import read_environment
+from relume.assets.small_asset_store import SmallAssetRecord, SmallAssetStore
 from relume.core.cache import asset_cached
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, warning_of
 
-STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
+STORE = SmallAssetStore(
+    "imported environment", "env:", "environment.json", SceneError, max_entries=500, record_type=SmallAssetRecord
+)
 MAX_WIDTH = 2048  # texels of 0.18°: finer than the environment triangles of a bake, and fast to integrate
 _RADIANCE, _THUMBNAIL = "radiance.npy", "thumbnail.png"
 
 
-@dataclass(frozen=True)
-class EnvironmentRecord:
-    """An imported environment in lists.
-
-    Attributes:
-        created: seconds since 1970. warnings: warnings about repairs during import, one sentence each.
-    """
-
-    id: str
-    name: str
-    created: float
-    warnings: tuple[ImporterWarning, ...]
-
-    @property
-    def map(self) -> str:
-        """Name of the environment in looks."""
-        return STORE.prefix + self.id
-
-
-def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecord:
+def store_environment(folder: Path, source: Path, name: str) -> SmallAssetRecord:
     """Import an equirectangular .hdr or .exr file; an existing one with this content gets the new name.
 
     Args:
@@ -63,24 +44,9 @@ def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecor
     def fill(staged_folder: Path) -> dict[str, Any]:
         np.save(staged_folder / _RADIANCE, environment.radiance)
         write_thumbnail(staged_folder / _THUMBNAIL, environment.radiance)
-        return {"warnings": [warning.document() for warning in environment.warnings]}
+        return {}
 
-    return get_record(folder, STORE.store(folder, source, name, fill))
-
-
-def records(folder: Path) -> list[EnvironmentRecord]:
-    """Return all environments of a folder, newest first."""
-    return STORE.records(folder, get_record)
-
-
-def get_record(folder: Path, identity: str) -> EnvironmentRecord:
-    """Return one environment. Raises NotFoundError; SceneError if its files are damaged."""
-    path = STORE.path(folder, identity)
-    document = STORE.load_record(path)
-    warnings = document.get("warnings")
-    if not isinstance(warnings, list):
-        raise STORE.damaged_error(path)
-    return EnvironmentRecord(identity, document["name"], document["created"], tuple(map(warning_of, warnings)))
+    return STORE.import_asset(folder, source, name, environment.warnings, fill)
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:

@@ -1,13 +1,17 @@
 """Store of IES files, in `relume.assets.asset_store`.
 
-    <folder>/<id>/web.npy     relative intensity, see `relume.assets.ies.read_ies.PhotometricWeb`
-                  ies.json    name, warnings and maximum intensity
+    <folder>/<id>/web.npy       relative intensity, see `relume.assets.ies.read_ies.PhotometricWeb`
+                  source.ies    the file, for exports; old assets lack it
+                  ies.json      name, warnings and maximum intensity
 
 Looks refer to one as "ies:<id>".
 """
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,44 +20,31 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.asset_store import AssetStore
+from relume.assets.ies.ies_file import IesFile
 from relume.assets.ies.read_ies import AZIMUTHS, POLAR_ANGLES, read_ies
+from relume.assets.small_asset_store import SmallAssetRecord, SmallAssetStore
 from relume.core.cache import asset_cached
 from relume.core.color import LUMENS_PER_WATT
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, warning_of
 from relume.core.validation import Pointer, invalid_value
 
 F32 = NDArray[np.float32]
 
-IES_FILES = AssetStore("IES file", "ies:", "ies.json", SceneError, max_entries=1_000)
-_WEB = "web.npy"
-
 
 @dataclass(frozen=True)
-class IesRecord:
-    """An IES file in lists.
+class IesRecord(SmallAssetRecord):
+    """An IES file in lists. candela: maximum intensity."""
 
-    Attributes:
-        created: seconds since 1970. candela: maximum intensity.
-        warnings: warnings about the import, one sentence each.
-    """
-
-    id: str
-    name: str
-    created: float
     candela: float
-    warnings: tuple[ImporterWarning, ...]
-
-    @property
-    def profile(self) -> str:
-        """Name of the file in lights of looks."""
-        return IES_FILES.prefix + self.id
 
     @property
     def emission(self) -> float:
         """Emission of a light with the intensity of the file, W/sr."""
         return self.candela / LUMENS_PER_WATT
+
+
+IES_FILES = SmallAssetStore("IES file", "ies:", "ies.json", SceneError, max_entries=1_000, record_type=IesRecord)
+_WEB, _SOURCE = "web.npy", "source.ies"
 
 
 def store_ies(folder: Path, source: Path, name: str) -> IesRecord:
@@ -68,24 +59,25 @@ def store_ies(folder: Path, source: Path, name: str) -> IesRecord:
 
     def fill(staged_folder: Path) -> dict[str, Any]:
         np.save(staged_folder / _WEB, web.relative_intensity)
-        return {"candela": web.candela, "warnings": [warning.document() for warning in warnings]}
+        shutil.copyfile(source, staged_folder / _SOURCE)
+        return {"candela": web.candela}
 
-    return get_record(folder, IES_FILES.store(folder, source, name, fill))
-
-
-def records(folder: Path) -> list[IesRecord]:
-    """Return all IES files of a folder, newest first."""
-    return IES_FILES.records(folder, get_record)
+    return IES_FILES.import_asset(folder, source, name, warnings, fill)
 
 
-def get_record(folder: Path, identity: str) -> IesRecord:
-    """Return one IES file. Raises NotFoundError; SceneError if its files are damaged."""
-    path = IES_FILES.path(folder, identity)
-    document = IES_FILES.load_record(path)
-    candela, warnings = document.get("candela"), document.get("warnings")
-    if not isinstance(candela, float) or not isinstance(warnings, list):
-        raise IES_FILES.damaged_error(path)
-    return IesRecord(identity, document["name"], document["created"], candela, tuple(map(warning_of, warnings)))
+def store_ies_files(folder: Path, files: Iterable[IesFile]) -> None:
+    """Store the IES files of a scene. Raises SceneError as `store_ies` does."""
+    for file in files:
+        with tempfile.TemporaryDirectory() as temporary:
+            source = Path(temporary) / _SOURCE
+            source.write_bytes(file.data)
+            store_ies(folder, source, file.name)
+
+
+def read_source(profile: str) -> bytes | None:
+    """Return the file of a light's `profile`; None for an old asset. Raises NotFoundError: it does not exist."""
+    path = IES_FILES.resolve(profile) / _SOURCE
+    return path.read_bytes() if path.is_file() else None
 
 
 def load_web(profile: str) -> Shaped[F32, "polar azimuth"]:

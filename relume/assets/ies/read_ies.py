@@ -48,6 +48,13 @@ class PhotometricWeb(NamedTuple):
     candela: float
 
 
+def mean_intensity(relative_intensity: Shaped[F32, "polar azimuth"]) -> float:
+    """Return the mean of a web over all directions, as in `PhotometricWeb.relative_intensity`."""
+    circle = relative_intensity[:, : max(relative_intensity.shape[1] - 1, 1)]  # 0° is 360°
+    solid_angle = np.sin(np.linspace(0, np.pi, len(circle)))
+    return float(circle.mean(axis=1) @ solid_angle / solid_angle.sum())
+
+
 def read_ies(path: Path, name: str) -> tuple[PhotometricWeb, tuple[ImporterWarning, ...]]:
     """Read an IES file; also return warnings about simplifications.
 
@@ -56,10 +63,16 @@ def read_ies(path: Path, name: str) -> tuple[PhotometricWeb, tuple[ImporterWarni
     Raises:
         SceneError: unsupported, damaged, or too large.
     """
+    with path.open("rb") as file:
+        return parse_ies(file.read(MAX_FILE_BYTES + 1), name)
+
+
+def parse_ies(data: bytes, name: str) -> tuple[PhotometricWeb, tuple[ImporterWarning, ...]]:
+    """Read the content of an IES file as `read_ies` does."""
     label = f"IES file {name!r}"
-    if path.stat().st_size > MAX_FILE_BYTES:
+    if len(data) > MAX_FILE_BYTES:
         raise SceneError(f"{label} is larger than {MAX_FILE_BYTES / 1e6:g} MB; choose a file of one luminaire")
-    text = _decode(path.read_bytes())
+    text = _decode(data)
     tilt = _TILT.search(text)
     if tilt is None:
         raise SceneError(f"{label} has no line TILT=; choose a file in the format LM-63")

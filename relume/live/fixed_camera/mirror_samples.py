@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from relume.brdf.specular_reflectance import specular_terms
 from relume.camera.ray_paths import NO_MIRROR
-from relume.lights.surface_hits import has_surface, surface_distance, surface_radiance
+from relume.lights.surface_hits import has_surface
 from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.live.fixed_camera.protocols import LocalLightTransport
+from relume.look import LightGeometry
 from relume.views.mirror_samples import MirrorSamples
 from relume.views.view import View
 
@@ -39,6 +40,7 @@ class MirrorFactors:
         self.gains = view.throughput if view.mirrored is None else view.throughput.copy()
         chain = None if view.mirrored is None else view.mirrored.chain
         self._emitters: tuple[tuple[LightSource, ...], F32 | None] = (), None
+        self._unit_radiance: dict[LightGeometry, F32] = {}
         self._specular_factors = None if chain is None else np.ones((*chain.material.shape, 3), np.float32)
         self.materials: list[int] = [] if chain is None else np.setdiff1d(chain.material, [NO_MIRROR]).tolist()
 
@@ -49,8 +51,24 @@ class MirrorFactors:
         """
         sources = lit_surfaces(light)
         if self._mirror_samples is not None and sources != self._emitters[0]:
-            self._emitters = sources, _emitter_radiance(self._mirror_samples, sources, local) if sources else None
+            self._emitters = sources, self._emitter_radiance(self._mirror_samples, sources, local) if sources else None
         return self._emitters[1]
+
+    def _emitter_radiance(
+        self, mirror_samples: MirrorSamples, sources: Sequence[LightSource], local: LocalLightTransport
+    ) -> Shaped[F32, "3 m"]:
+        """Radiance of lights on the ray paths from mirrors to mirrored samples."""
+        segments = mirror_samples.origin, mirror_samples.direction, mirror_samples.distance
+        self._unit_radiance = {
+            geometry: self._unit_radiance[geometry]
+            if geometry in self._unit_radiance
+            else local.surface_radiance_along(geometry, *segments)
+            for geometry, _ in sources
+        }
+        radiance = np.zeros((3, len(mirror_samples.sample)), np.float32)
+        for geometry, gain in sources:
+            radiance += np.outer(np.array(gain, np.float32), self._unit_radiance[geometry])
+        return radiance
 
     def update_emission(self, documents: Mapping[int, Documents | None]) -> list[int]:
         """Update mirrors to a look.
@@ -78,15 +96,3 @@ class MirrorFactors:
             axis=1
         )
         return changed
-
-
-def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSource], local: LocalLightTransport) -> F32:
-    """Radiance of lights on the ray paths from mirrors to mirrored samples. (3, m)"""
-    radiance = np.zeros((3, len(mirror_samples.sample)), np.float32)
-    for geometry, gain in sources:
-        distance = surface_distance(geometry, mirror_samples.origin, mirror_samples.direction)
-        emitted = surface_radiance(geometry) * np.array(gain, np.float32)
-        is_hit = distance < mirror_samples.distance
-        is_hit &= local.is_lit_behind(geometry.link, mirror_samples.origin, mirror_samples.direction)
-        radiance[:, is_hit] += emitted[:, None]
-    return radiance

@@ -163,13 +163,18 @@ class LocalLightTransport(Protocol):
         """Return the image that a light's surfaces emit; None if they emit as in the scene."""
         ...
 
-    def is_lit_behind(
-        self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
-    ) -> Shaped[NDArray[np.bool_], " n"]:
-        """True for rays that start on a surface that a light with this link lights.
+    def surface_radiance_along(
+        self,
+        geometry: LightGeometry,
+        origins: Shaped[F32, "n 3"],
+        directions: Shaped[F32, "n 3"],
+        distances: Shaped[F32, " n"],
+    ) -> Shaped[F32, " n"]:
+        """Return the radiance of a light of unit emission with a surface, along rays from surfaces that it lights.
 
         Args:
-            link: of the light. origins: where the rays start. directions: away from the surface.
+            geometry: see `relume.lights.surface_hits.has_surface`. origins: where the rays start, meters.
+            directions: away from the surface. distances: at which they end, meters.
         """
         ...
 

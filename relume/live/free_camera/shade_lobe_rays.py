@@ -50,7 +50,7 @@ def _find_points(scene, gbuffer, origins, pixel_angle, rows, start, stop, points
         scene: `PixelArrays`. gbuffer: `GBuffer`. origins: `OriginMesh` of the triangles.
         pixel_angle: angle of a pixel, radians. points: `SurfacePoints`, written. wo: written. (n, 3)
     """
-    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals, _ = scene
     (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
     scratch = np.empty(3, np.float32)
     for i in range(start, stop):
@@ -90,7 +90,7 @@ def _add_lobes(scene, gbuffer, pixel_angle, albedo, points, wo, radiance, rows, 
         scene, gbuffer, pixel_angle: as in `_find_points`. albedo: of `TracedLobe`.
         points, wo: of each ray. radiance: L̄ of each. out: added to. (rays, 3)
     """
-    textures, uvs, _, _, uv_faces, face_material, face_normal, uv_scale, _ = scene
+    textures, uvs, _, _, uv_faces, face_material, face_normal, uv_scale, _, _ = scene
     (face, uv, distance), directions, _, _, _, _, _, _ = gbuffer
     texture_value = np.empty(3, np.float32)
     for i in range(start, stop):

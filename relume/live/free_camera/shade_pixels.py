@@ -199,7 +199,7 @@ def perturbed_normal(  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _shade_pixels(scene, pixel_angle, gbuffer, probes, emission, mirror_data, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the radiance of nodes and lobes, and emission, along rays rows[start:stop]."""
-    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals, is_two_sided = scene
     (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
     node_radiance, is_reflective, light_gradient = probes
     lobes = mirror_data.lobes
@@ -246,7 +246,8 @@ def _shade_pixels(scene, pixel_angle, gbuffer, probes, emission, mirror_data, ro
             image = textures.material_textures[material, EMISSION]
             sample_texture(textures, image, texture_uv[0], texture_uv[1], footprint, texture_value)
         for channel in range(3):
-            out[p, channel] = emission[material, channel] * texture_value[channel]
+            is_emissive = view_cosine < 0 or is_two_sided[material]
+            out[p, channel] = emission[material, channel] * texture_value[channel] if is_emissive else np.float32(0)
         for group in range(NUM_GROUPS):
             if not is_reflective[material, group]:
                 continue

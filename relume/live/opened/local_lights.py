@@ -26,6 +26,7 @@ from relume.lights.local_lights import (
     source_triangles,
 )
 from relume.lights.shape_triangles import LightTriangles, sun_triangles
+from relume.lights.surface_hits import surface_distance, surface_radiance
 from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.live.free_camera.lobe_lights import LobeEmitter, LobeLight
 from relume.live.opened.linked_surfaces import LinkedSurfaces
@@ -38,6 +39,7 @@ from relume.raytrace.intensity_table import Gobo, intensity_table, project_gobo
 from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
 from relume.raytrace.moving_light import MovingLight, trace_moving_light
 from relume.raytrace.scene_buffers import is_front
+from relume.raytrace.source_surfaces import SourceSurfaces
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.shading_points import LocalRays
@@ -100,15 +102,32 @@ class LocalLights:
         """The surfaces that lights light, and those that cast their shadows."""
         return LinkedSurfaces(self._store, self.positions, self.faces, self.embree, self._cache, self._key)
 
-    def is_lit_behind(
-        self, link: Link | None, origins: Shaped[F32, "n 3"], directions: Shaped[F32, "n 3"]
-    ) -> Shaped[NDArray[np.bool_], " n"]:
-        """True for rays that start on a surface that a light with this link lights.
+    def surface_radiance_along(
+        self,
+        geometry: LightGeometry,
+        origins: Shaped[F32, "n 3"],
+        directions: Shaped[F32, "n 3"],
+        distances: Shaped[F32, " n"],
+    ) -> Shaped[F32, " n"]:
+        """Return the radiance of a light of unit emission with a surface, along rays from surfaces that it lights.
 
         Args:
-            link: of the light. origins: where the rays start. directions: away from the surface.
+            geometry: see `has_surface`. origins: where the rays start, meters. directions: away from the surface.
+            distances: at which they end, meters.
         """
-        return self.linked.is_lit(link, origins, directions)
+        if geometry.source:
+            radiance = self._source_surfaces(geometry.source).radiance_along(origins, directions, distances)
+        else:
+            is_hit = surface_distance(geometry, origins, directions) < distances
+            radiance = np.where(is_hit, np.float32(surface_radiance(geometry)), np.float32(0))
+        return np.where(self.linked.is_lit(geometry.link, origins, directions), radiance, np.float32(0))
+
+    def _source_surfaces(self, source: str) -> SourceSurfaces:
+        def build() -> SourceSurfaces:
+            members = read_light_members(self._store, source)
+            return SourceSurfaces.build(members.light_fields((1.0,)), *self._bounds())
+
+        return self._cache.transient.get_value((self._key, "source surfaces", source), build)
 
     def check_links(self, links: Iterable[Link]) -> None:
         """See `LinkedSurfaces.check`."""

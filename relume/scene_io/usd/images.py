@@ -1,4 +1,4 @@
-"""Images that layers name."""
+"""Images and IES files that layers name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ class LayerImages:
         asset = self.layers.assets.get(file)
         if asset is None:
             return None
-        return self.layers.read(replace(asset, name=first_tile(asset.name, self.warnings)), "image")
+        kind = "IES file" if asset.name.lower().endswith(".ies") else "image"
+        return self.layers.read(replace(asset, name=first_tile(asset.name, self.warnings)), kind)
 
     def printable_name(self, file: str) -> str:
         """See `DocumentFiles.printable_name`."""

@@ -26,6 +26,7 @@ MATERIALX_SUFFIX = ".mtlx"
 MAX_LAYERS = 1_000
 MAX_DEPTH = 32  # of packages and layers that name one another
 ERROR = re.compile(r"In <([^>]*)>: ([^@<]+)")
+_USERS = {"image": "a texture", "layer": "a layer", "IES file": "a light"}  # of each kind of file
 INSTALL = "USD files need usd-core: pip install relume[usd]"
 
 
@@ -167,9 +168,8 @@ class LayerFolder:
         return self._packages[asset]
 
     def read(self, asset: LayerAsset, kind: str) -> bytes | None:
-        """Read a file; None with a warning if it is missing. kind: "image" or "layer"."""
-        label = "a texture" if kind == "image" else "a layer"
-        return read_companion(asset.companions, "", asset.name, label, self._warnings, kind)
+        """Read a file; None with a warning if it is missing. kind: of `_USERS`."""
+        return read_companion(asset.companions, "", asset.name, _USERS[kind], self._warnings, kind)
 
 
 def _remove_clips(layer: Any, warnings: list[ImporterWarning]) -> None:

@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.equirect import lookup, texel_directions
 from relume.assets.environments.read_environment import read_environment
+from relume.assets.ies.ies_file import IesFile
+from relume.assets.ies.ies_store import IES_FILES
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
 from relume.scene.validate import MAX_METERS, MAX_SUN_ANGLE, RADIUS_RANGE
 from relume.scene_io.surfaces.surface_images import ImageInput, SurfaceImages
+from relume.scene_io.usd.ies_profiles import profile_rotation, read_profile
 from relume.scene_io.usd.light_links import read_links
 
 F64 = NDArray[np.float64]
@@ -33,6 +36,7 @@ UNIFORM_SIZE = (2, 4)  # texels of a dome without an image
 _BLENDER_VERSION = re.compile(r"Blender v(\d{1,4})\.")
 _BLENDER_SUN, _BLENDER_REASON = 4.0, "Blender writes a quarter"
 DOMES = ("DomeLight", "DomeLight_1")
+_SHAPED = ("SphereLight", "DiskLight", "CylinderLight")  # which may have a cone or an IES file
 KINDS = ("DistantLight", "SphereLight", "DiskLight", "RectLight", "CylinderLight", *DOMES)
 
 
@@ -57,7 +61,7 @@ class UsdLightReader:
         time, meters, images, collector, warnings: of the stage.
         objects: name of each object of the scene by the path of its prim, see `read_links`.
     Attributes:
-        environment: light of the first dome; None without one.
+        environment: light of the first dome; None without one. ies_files: of all lights, by name in looks.
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class UsdLightReader:
         self._time, self._meters, self._images, self._objects = time, meters, images, objects
         self._collector, self._warnings = collector, warnings
         self.environment: Environment | None = None
+        self.ies_files: dict[str, IesFile] = {}
 
     def add(self, prim: Any, to_world: Shaped[F64, "4 4"]) -> None:
         """Add a light with its links; it emits along the −Z of its prim.
@@ -168,8 +173,7 @@ class UsdLightReader:
             return
         if self._is_normalized(prim):
             emitted = emitted / (area / self._meters**2)
-        if kind == "DiskLight" and self._cone(prim) is not None:
-            self._add_spot(prim, fields, emitted * area, label)
+        if kind == "DiskLight" and self._add_shaped(prim, fields, emitted * area, to_world, label):
             return
         if self._cone(prim) is not None:
             self._warnings.append(unsupported(f"The cone of {label} isn't supported; it emits to all of its front."))
@@ -198,8 +202,7 @@ class UsdLightReader:
         if area <= 0 and not self._is_normalized(prim):
             self._warnings.append(unsupported(f"Skipped {label}: it has no area."))
             return
-        if self._cone(prim) is not None:
-            self._add_spot(prim, fields, intensity, label)
+        if self._add_shaped(prim, fields, intensity, to_world, label):
             return
         name, position = self._collector.name(prim.GetName()), {"position": fields["position"]}
         if area <= 0 or prim.GetAttribute("treatAsPoint").Get(self._time):
@@ -221,6 +224,21 @@ class UsdLightReader:
             return None
         softness = float(np.clip(prim.GetAttribute("inputs:shaping:cone:softness").Get(self._time) or 0.0, 0, 1))
         return [float(angle) * (1 - softness), float(angle)]
+
+    def _add_shaped(self, prim: Any, fields: dict[str, Any], intensity: F64, to_world: F64, label: str) -> bool:
+        """Add a light with a cone or an IES file, as a point or a spot; False if it has neither."""
+        profile = read_profile(prim, self._time, self._images.files, label, self._warnings)
+        cone = self._cone(prim)
+        if profile is not None:
+            name = IES_FILES.name_of(profile.file.data)
+            self.ies_files[name] = profile.file
+            fields = {**fields, "profile": name, "rotation": profile_rotation(to_world, fields["direction"])}
+            intensity = intensity * profile.factor
+        if cone is not None:
+            self._add_spot(prim, fields, intensity, label)
+        elif profile is not None:
+            self._collector.add(self._collector.name(prim.GetName()), {"kind": "point", **fields}, intensity)
+        return cone is not None or profile is not None
 
     def _add_spot(self, prim: Any, fields: dict[str, Any], intensity: F64, label: str) -> None:
         if prim.GetAttribute("inputs:shaping:focus").Get(self._time):
@@ -246,8 +264,8 @@ class UsdLightReader:
         if UsdLux.LightAPI(prim).GetFiltersRel().GetTargets():
             self._warnings.append(unsupported(f"Filters of {label} aren't supported."))
         ies = prim.GetAttribute("inputs:shaping:ies:file").Get(self._time)
-        if ies and ies.path:
-            self._warnings.append(unsupported(f"The IES file of {label} isn't read; load it in the light's inspector."))
+        if ies and ies.path and str(prim.GetTypeName()) not in _SHAPED:
+            self._warnings.append(unsupported(f"The IES file of {label} isn't read: points and spots can have one."))
 
     def _add_dome(self, prim: Any, to_world: F64, label: str) -> None:
         """The environment; of several domes, the first."""

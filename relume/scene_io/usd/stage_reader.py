@@ -157,11 +157,12 @@ class _StageReader:
         scene_materials = collector.emissive_light(
             [material.read_material.material for material in materials], emissions, meshes
         )
-        return finalize(
+        scene = finalize(
             name, meshes, scene_materials, cameras or [framing_camera(meshes, "front")],
             environment or lights.environment or studio(), self._warnings, lights=collector.lights,
             offset=(float(origin[0]), float(origin[1]), float(origin[2])),
         )  # fmt: skip
+        return replace(scene, ies_files=tuple(lights.ies_files.values()))
 
     def _root_transform(self) -> tuple[F64, float]:
         """From the space of the stage to that of the reader, and the unit of the stage in it."""

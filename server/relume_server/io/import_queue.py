@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from fastapi.concurrency import run_in_threadpool
 
@@ -28,6 +28,7 @@ from relume_server.auth.quotas import OwnedKind, Quotas
 from relume_server.auth.reservations import MAX_CONCURRENT_IMPORTS, Reservation
 from relume_server.io.fair_slots import Slots
 from relume_server.io.import_processes import Importers, ImportTooLargeError
+from relume_server.io.import_request import IES as IES_FOLDER
 from relume_server.io.import_request import IMAGES as IMAGES_FOLDER
 from relume_server.io.import_request import SUMMARY, UPLOAD_PREFIX, ImportRequest
 from relume_worker.ledger import Ledger
@@ -121,20 +122,22 @@ class ImportQueue:
             target = store[1](self._settings.data) / store[0].path(into, identity).name
         num_bytes = _checked_bytes(into / identity)
         if not target.exists():  # otherwise it takes no additional space
-            reservation.reserve(num_bytes + folder_bytes(into / IMAGES_FOLDER))
-        self._adopt_images(reservation.owner, into / IMAGES_FOLDER)
+            reservation.reserve(num_bytes + folder_bytes(into / IMAGES_FOLDER) + folder_bytes(into / IES_FOLDER))
+        self._adopt_assets(reservation.owner, "image", into / IMAGES_FOLDER)
+        self._adopt_assets(reservation.owner, "ies", into / IES_FOLDER)
         if store is None:
             self._register_scene(into, identity, target)
         else:
             store[0].adopt(target.parent, into / identity)
         reservation.convert(store[2] if store else "scene", identity, num_bytes)
 
-    def _adopt_images(self, owner: str, folder: Path) -> None:
-        """Move the images of imported materials into place, and assign them to their owner."""
-        images = images_path(self._settings.data)
-        for path in IMAGES.paths(folder):
-            IMAGES.adopt(images, path)
-            self._quotas.assign_owner(owner, "image", path.name, folder_bytes(images / path.name))
+    def _adopt_assets(self, owner: str, kind: Literal["image", "ies"], folder: Path) -> None:
+        """Move images of imported materials, or IES files of scenes, into place, and assign them to their owner."""
+        store, folder_of, owned_kind = _STORES[kind]
+        target = folder_of(self._settings.data)
+        for path in store.paths(folder):
+            store.adopt(target, path)
+            self._quotas.assign_owner(owner, owned_kind, path.name, folder_bytes(target / path.name))
 
     def _register_scene(self, into: Path, identity: str, target: Path) -> None:
         """Move a scene into place; an existing damaged one is replaced."""

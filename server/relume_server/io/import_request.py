@@ -29,7 +29,7 @@ _OUT_OF_MEMORY_MESSAGES = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
 SUMMARY = "summary.json"
 """File with the summary of a scene, next to its folder."""
-IMAGES = "images"
+IMAGES, IES = "images", "ies"
 """Folder with the images of imported materials, next to the material's."""
 ImportKind = Literal[
     "scene", "environment", "built_in", "grounded", "image", "ies", "lut", "material", "imported", "tile"
@@ -230,9 +230,11 @@ def _put_on_ground(request: ImportRequest) -> str:
 
 
 def _write_scene(request: ImportRequest, scene: Scene) -> str:
+    from relume.assets.ies.ies_store import store_ies_files
     from relume.scene.scene_folder import save_scene
     from relume_worker.scenes import summarize_scene
 
+    store_ies_files(Path(request.into) / IES, scene.ies_files)
     save_scene(scene, Path(request.into) / scene.id)
     (Path(request.into) / SUMMARY).write_text(json.dumps(summarize_scene(scene)))
     return scene.id

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 from session_client import open_session
 from tiny_scenes import still_life
 
-from relume.assets.environments.environment_store import records
+from relume.assets.environments.environment_store import STORE
 from relume.assets.environments.read_environment import read_environment
 from relume.core.errors import SceneError
 from relume.store.bake_protocol import Recipe
@@ -161,8 +161,8 @@ def test_command_line_imports_lists_and_renders(tmp_path, dusk_file, capsys):
     home = ["--data", str(tmp_path)]
     assert main(["environment", "import", str(dusk_file), "--name", "Evening", *home]) == 0
     name = capsys.readouterr().out.strip()
-    (record,) = records(tmp_path / "environments")
-    assert (record.map, record.name) == (name, "Evening")
+    (record,) = STORE.list_records(tmp_path / "environments")
+    assert (record.reference, record.name) == (name, "Evening")
     assert main(["list", "environments", *home]) == 0
     listed = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in listed] == ["studio", "clear_sky", "sunset", "overcast", name]

@@ -12,7 +12,7 @@ from PIL import Image
 from relume.assets.environments import environment_store
 from relume.assets.environments.built_in import BUILT_IN, load_built_in
 from relume.assets.environments.environment_names import environment_exists, environment_names, load_environment
-from relume.assets.environments.environment_store import STORE, get_record, records, store_environment, thumbnail_path
+from relume.assets.environments.environment_store import STORE, store_environment, thumbnail_path
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.assets.environments.thumbnail import thumbnail
 from relume.core.color import luminance
@@ -21,14 +21,14 @@ from relume_server.io.import_request import remove_strays
 
 
 def test_an_import_is_listed_and_found_by_its_name(library):
-    (record,) = records(library)
-    assert (record.name, record.map, record.warnings) == ("Dusk", f"env:{record.id}", ())
-    environment = load_environment(record.map)
+    (record,) = STORE.list_records(library)
+    assert (record.name, record.reference, record.warnings) == ("Dusk", f"env:{record.id}", ())
+    environment = load_environment(record.reference)
     assert environment.name == "Dusk"
     np.testing.assert_array_equal(environment.radiance, dusk())
     assert not environment.radiance.flags.writeable
-    assert environment_exists(record.map)
-    assert environment_names() == [*BUILT_IN, record.map]
+    assert environment_exists(record.reference)
+    assert environment_names() == [*BUILT_IN, record.reference]
     with Image.open(thumbnail_path(library, record.id)) as picture:
         assert (picture.size, picture.mode) == ((192, 96), "RGB")
 
@@ -37,7 +37,7 @@ def test_importing_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
     first = store_environment(tmp_path / "library", dusk_file, "One")
     again = store_environment(tmp_path / "library", dusk_file, "Two")
     assert (again.id, again.name, again.created) == (first.id, "Two", first.created)
-    assert len(records(tmp_path / "library")) == 1
+    assert len(STORE.list_records(tmp_path / "library")) == 1
 
 
 def test_a_bad_file_leaves_nothing_behind(tmp_path):
@@ -67,7 +67,7 @@ def test_large_maps_are_downsampled_and_keep_their_brightness(tmp_path, monkeypa
     with STORE.with_search_folder(tmp_path / "library") as folder:
         record = store_environment(folder, path, "Large")
         assert record.warnings == ("Environment “Large” was scaled from 96×48 to 32×16.",)
-        radiance = load_environment(record.map).radiance
+        radiance = load_environment(record.reference).radiance
     np.testing.assert_allclose(radiance, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
 
 
@@ -88,14 +88,14 @@ def test_other_names_are_unknown(library, name):
     ],
 )
 def test_errors_name_damaged_environment_files(library, tmp_path, file, content):
-    shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
+    shutil.copytree(library / STORE.list_records(library)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / file).write_bytes(content)
     with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="import it again"):
         load_environment("env:fedcba9876543210")
 
 
 def test_arrays_of_other_shapes_are_damage(library, tmp_path):
-    shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
+    shutil.copytree(library / STORE.list_records(library)[0].id, tmp_path / "fedcba9876543210")
     for shape in ((4, 4, 3), (4, 8), (4, 8, 4), (0, 0, 3)):
         np.save(tmp_path / "fedcba9876543210" / "radiance.npy", np.ones(shape, np.float32))
         with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="damaged"):
@@ -103,10 +103,10 @@ def test_arrays_of_other_shapes_are_damage(library, tmp_path):
 
 
 def test_a_record_without_warnings_is_damage(library, tmp_path):
-    shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
+    shutil.copytree(library / STORE.list_records(library)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / "environment.json").write_text('{"format": 1, "name": "x", "created": 1.0}')
     with pytest.raises(SceneError, match="damaged"):
-        get_record(tmp_path, "fedcba9876543210")
+        STORE.get_record(tmp_path, "fedcba9876543210")
 
 
 def mean_luminance(radiance):

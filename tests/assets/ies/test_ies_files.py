@@ -138,4 +138,4 @@ def test_stored_files_have_the_emission_of_their_candela(tmp_path):
         record = store_ies(library, path, "Lamp")
         assert record.candela == pytest.approx(6830)
         assert record.emission == pytest.approx(10)
-        assert load_web(record.profile)[240, 0] == pytest.approx(0.5, rel=1e-5)
+        assert load_web(record.reference)[240, 0] == pytest.approx(0.5, rel=1e-5)

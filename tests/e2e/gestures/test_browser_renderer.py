@@ -257,3 +257,29 @@ def test_reflections_turn_between_points_as_the_server_has_them(
         inside = beside_edges(by_server)
         assert inside.mean() > 0.3
         assert (off[inside] > 2).mean() < 0.01
+
+
+@pytest.fixture
+def panel_from_behind(server: Server) -> Iterator[str]:
+    """Its scene; it is deleted afterwards."""
+    identity = server.panel_from_behind()
+    yield identity
+    server.delete(f"/api/scenes/{identity}")
+
+
+@pytest.mark.slow
+def test_one_sided_surfaces_emit_nothing_from_behind(server: Server, browser: Browser, panel_from_behind: str) -> None:
+    """As the server has it; with emission, the panel would be white."""
+    with opened_page(browser) as page:
+        never_at_rest(page, [])
+        page.goto(f"{server.url}/?scene={panel_from_behind}")
+        wait_until_drawn(page)
+        editor = Editor(page)
+        editor.canvas.focus()
+        page.keyboard.press("ArrowLeft")
+        by_server = settled(editor)
+        draw_here(page)
+        off = np.abs(by_server - settled(editor)).max(axis=2)
+        inside = beside_edges(by_server)
+        assert inside.mean() > 0.3
+        assert (off[inside] > 2).mean() < 0.01

@@ -24,7 +24,7 @@ def maps(tmp_path_factory):
     with STORE.with_search_folder(tmp_path_factory.mktemp("library")) as library:
         white = dusk() / [1.0, 0.4, 0.2]
         paths = [write_map(folder / f"{name}.exr", white * c) for name, c in zip("rgb", COLORS, strict=True)]
-        yield [store_environment(library, path, path.stem).map for path in paths]
+        yield [store_environment(library, path, path.stem).reference for path in paths]
 
 
 @pytest.fixture(params=["transfer", "gathered"])

@@ -18,7 +18,9 @@ from relume.live.opened.openers import open_transfer
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.camera_rays import camera_directions
-from relume.scene.model import Material
+from relume.scene.light_members import members_of
+from relume.scene.model import Light, Material
+from relume.scene.scene_folder import make_scene
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 
@@ -297,3 +299,34 @@ def test_dimming_an_area_light_dims_its_mirror_image(mirror_bake):
         picture.set_look(look)
         run_until_exact(picture)
         np.testing.assert_allclose(picture.image(), render_image(mirror_bake, "front", look), rtol=1e-4, atol=1e-4)
+
+
+PANELS = [
+    {"kind": "rectangle", "position": [-0.5, 1.4, 0.5], "direction": [0, 0, -1], "size": [0.5, 0.4], "rotation": 20.0},
+    {"kind": "rectangle", "position": [0.6, 1.4, 0.5], "direction": [0, 0, 1], "size": [0.5, 0.4], "rotation": 0.0},
+    {"kind": "rectangle", "position": [0.6, 1.4, 0.6], "direction": [0, 0, -1], "size": [0.5, 0.4], "rotation": 0.0},
+    {"kind": "disc", "position": [0.0, 0.9, 0.8], "direction": [0, 0.1, -1], "radius": 0.25},
+]
+
+
+def test_mirrors_show_the_panels_of_a_source(tmp_path):
+    """As the panels show singly; one in front of another faces away from the mirror."""
+    emissions = [2.0, 4.0, 8.0, 6.0]
+    scene = room(metal(), np.full((4, 8, 3), 1e-6, np.float32))
+    members = members_of(PANELS, emissions)
+    source = Light("Panels", {"kind": "panels", "source": "Panels", "emission": [1.0, 2.0, 0.5]}, "", members)
+    merged = baked(make_scene(scene.name, scene.meshes, scene.materials, scene.cameras, scene.environment,
+                              lights=(source,)), tmp_path)  # fmt: skip
+
+    def single(document):
+        document["lights"]["Panels"]["enabled"] = False
+        for k, (fields, emission) in enumerate(zip(PANELS, emissions, strict=True)):
+            document["lights"][f"P{k}"] = {**fields, "emission": [emission, 2 * emission, emission / 2]}
+
+    actual, expected = shown(merged), shown(merged, single)
+    is_mirror = merged.views["front"].material_ids() == 0
+    bright = is_mirror & (expected[..., 1] > 1)
+    inner = bright & np.roll(bright, 1, 0) & np.roll(bright, -1, 0) & np.roll(bright, 1, 1) & np.roll(bright, -1, 1)
+    assert inner.sum() > 20
+    np.testing.assert_allclose(actual[inner], expected[inner], rtol=0.02)
+    np.testing.assert_allclose(actual[is_mirror].sum(axis=0), expected[is_mirror].sum(axis=0), rtol=0.02)

@@ -50,7 +50,7 @@ def library(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def map_name(library, tmp_path_factory):
-    return store_environment(library, write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk()), "Dusk").map
+    return store_environment(library, write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk()), "Dusk").reference
 
 
 def under(name, **more):

@@ -1,13 +1,15 @@
-/** A light's emission: color as numbers and temperature, power in watts and lumens. */
+/** A light's emission: color as numbers and temperature; power and luminance in watts and lumens; intensity in stops. */
 import { beginDrag } from "../../session/prepare";
+import { RANGES } from "../../look.gen";
 import type { Light } from "../../protocol";
 import { defaultLook } from "../../state/look";
 import { ColorField } from "../../ui/ColorField";
 import { LabeledSlider } from "../../ui/LabeledSlider";
 import { NumberField } from "../../ui/NumberField";
+import { factorOf, stopsOf } from "../../ui/stops";
 import { UNITS } from "./lightKinds";
 import { editLight, lightPath } from "./lightEdits";
-import { emissionForWatts, LUMENS_PER_WATT, unitsOf, wattsOf } from "./power";
+import { emissionForWatts, LUMENS_PER_WATT, quantitiesOf, wattsOf, type Quantity } from "./power";
 import { withKelvin, MIN_KELVIN, MAX_KELVIN, kelvinOf } from "./temperature";
 
 interface Props {
@@ -16,17 +18,19 @@ interface Props {
 }
 
 const MOST_WATTS = 1e13;
+const MAX_INTENSITY = RANGES.light.intensity.maximum;
+const MIN_STOPS = -20; // about a millionth
 
-function Power({ name, light }: Props) {
-  const { label, watts, lumens } = unitsOf(light);
+function Brightness({ name, light, quantity }: Props & { quantity: Quantity }) {
+  const { label, watts, lumens, perWatt } = quantity;
   const currentWatts = wattsOf(light);
   const setWatts = (label: string, next: number) => {
     const emission = emissionForWatts(light, next);
     if (emission !== null) editLight(label, name, "emission", emission);
   };
   const fields = [
-    { unit: watts, size: 1 },
-    { unit: lumens, size: LUMENS_PER_WATT },
+    { unit: watts, size: perWatt },
+    { unit: lumens, size: perWatt * LUMENS_PER_WATT },
   ];
   return (
     <div class="numbers" role="group" aria-label={label} style={{ "--count": 2 }}>
@@ -67,6 +71,37 @@ function Temperature({ name, light }: Props) {
   );
 }
 
+function Intensity({ name, light }: Props) {
+  const setIntensity = (next: number) => editLight("Intensity", name, "intensity", next);
+  return (
+    <div class="numbers" role="group" aria-label="Intensity" style={{ "--count": 2 }}>
+      <span class="param-label">Intensity</span>
+      <label>
+        <NumberField
+          label="Intensity, factor"
+          value={light.intensity}
+          minimum={0}
+          maximum={MAX_INTENSITY}
+          step={Math.max(light.intensity * 0.1, 1e-3)}
+          onChange={setIntensity}
+        />
+        <small>×</small>
+      </label>
+      <label>
+        <NumberField
+          label="Intensity, EV"
+          value={stopsOf(light.intensity)}
+          minimum={MIN_STOPS}
+          maximum={stopsOf(MAX_INTENSITY)}
+          step={1 / 3}
+          onChange={(next) => setIntensity(factorOf(next))}
+        />
+        <small>EV</small>
+      </label>
+    </div>
+  );
+}
+
 export function Emission({ name, light }: Props) {
   return (
     <>
@@ -81,7 +116,10 @@ export function Emission({ name, light }: Props) {
         onChange={(value) => editLight("Emission", name, "emission", value)}
       />
       <Temperature name={name} light={light} />
-      <Power name={name} light={light} />
+      {quantitiesOf(light).map((quantity) => (
+        <Brightness key={quantity.label} name={name} light={light} quantity={quantity} />
+      ))}
+      <Intensity name={name} light={light} />
     </>
   );
 }

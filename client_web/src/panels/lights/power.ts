@@ -1,4 +1,4 @@
-/** Total power of a light, radiometric and photometric.
+/** Total power of a light and radiance of its surface, radiometric and photometric.
  *
  * relume's light is radiometric; 683 lm are 1 W, as in imported files. RGB values count by their luminance. */
 import { luminance } from "../../render/color/tonemap";
@@ -6,7 +6,7 @@ import type { Light, Rgb } from "../../protocol";
 
 export const LUMENS_PER_WATT = 683;
 
-/** Radiometric and photometric units of a light's power. */
+/** Radiometric and photometric units of a light's brightness. */
 export interface PhotometricUnits {
   label: string;
   watts: string;
@@ -21,10 +21,24 @@ const MEAN_IRRADIANCE: PhotometricUnits = { ...IRRADIANCE, label: "Mean illumina
 const INTENSITY: PhotometricUnits = { label: "Mean intensity", watts: "W/sr", lumens: "cd" };
 /** For lights with an IES file or a gobo: as data sheets state it. */
 const PEAK_INTENSITY: PhotometricUnits = { label: "Peak intensity", watts: "W/sr", lumens: "cd" };
-/** For emissive meshes and many area lights, whose area belongs to the scene. */
-const RADIANCE: PhotometricUnits = { label: "Radiance", watts: "W/sr/m²", lumens: "cd/m²" };
+/** For surfaces; the only one for emissive meshes and many area lights, whose area belongs to the scene. A nit is 1 cd/m². */
+const RADIANCE: PhotometricUnits = { label: "Luminance", watts: "W/sr/m²", lumens: "cd/m²" };
 
-export function unitsOf(light: Light): PhotometricUnits {
+/** A quantity that can be typed. `perWatt`: its value for each watt of `wattsOf`. */
+export interface Quantity extends PhotometricUnits {
+  perWatt: number;
+}
+
+/** The quantities of a light's brightness. */
+export function quantitiesOf(light: Light): Quantity[] {
+  const units = unitsOf(light);
+  const quantity = { ...units, perWatt: 1 };
+  return units === POWER && isSurface(light)
+    ? [quantity, { ...RADIANCE, perWatt: 1 / emittingExtent(light) }]
+    : [quantity];
+}
+
+function unitsOf(light: Light): PhotometricUnits {
   if (isShaped(light)) return PEAK_INTENSITY;
   switch (light.kind) {
     case "directional":
@@ -41,6 +55,8 @@ export function unitsOf(light: Light): PhotometricUnits {
       return POWER;
   }
 }
+
+const isSurface = ({ kind }: Light) => ["rectangle", "disc", "sphere", "tube"].includes(kind);
 
 /** True for a light with an IES file or a gobo: its power depends on it. */
 const isShaped = (light: Light) =>

@@ -57,9 +57,11 @@ void main() {
   int position = int(corner == 0 ? corners.x : corner == 1 ? corners.y : corners.z);
   vAway = texelFetch(uPositions, at(position), 0).xyz - uCameraPosition;
   vBary = vec2(corner == 1, corner == 2);
-  vSide = texelFetch(uSides, at(2 * number + int(dot(facing.xyz, vAway) > 0.0)), 0);
-  vEmission = intBitsToFloat(texelFetch(uMaterials, at(material + ${NUM_GROUPS + 1}), 0)).rgb;
-  ${needsWholeSurface(shows) ? `vCorners = corners; vFacing = facing; vKind = texelFetch(uMaterials, at(material + ${NUM_GROUPS}), 0).xy;` : ""}
+  bool isBackFace = dot(facing.xyz, vAway) > 0.0;
+  ivec4 kind = texelFetch(uMaterials, at(material + ${NUM_GROUPS}), 0);
+  vSide = texelFetch(uSides, at(2 * number + int(isBackFace)), 0);
+  vEmission = isBackFace && kind.w == 0 ? vec3(0.0) : intBitsToFloat(texelFetch(uMaterials, at(material + ${NUM_GROUPS + 1}), 0)).rgb;
+  ${needsWholeSurface(shows) ? "vCorners = corners; vFacing = facing; vKind = kind.xy;" : ""}
   vec3 cameraSpace = vAway * uRotation;
   gl_Position = vec4(cameraSpace.xy * uFrustum.xy, uFrustum.z * cameraSpace.z + uFrustum.w, -cameraSpace.z);
 }

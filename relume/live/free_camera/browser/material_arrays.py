@@ -210,8 +210,8 @@ def _material_rows(
     """Rows of each material; −1 for none. (materials · (2 groups + 2), 4) int32
 
     Per group: its isotropic and anisotropic table, 1 if it reflects, its texture. Then its lobe, its normal map, 1 for
-    a shadow catcher, −1. Then the bits of its emission, and its emission texture. Then per group both tables of the
-    environment in highlights, and both of other light.
+    a shadow catcher, 1 if it emits to both sides. Then the bits of its emission, and its emission texture. Then per
+    group both tables of the environment in highlights, and both of other light.
     """
     tables, lobes, is_reflective = materials.tables, materials.lobes, materials.is_reflective
     material_textures = transfer.stored_scene_with(materials.overrides).textures.material_textures
@@ -222,6 +222,7 @@ def _material_rows(
     out[:, NUM_GROUPS, 0] = lobes.lobe_index
     out[:, NUM_GROUPS, 1] = material_textures[:, NORMAL_MAP]
     out[:, NUM_GROUPS, 2] = [state.look.materials[name].shadow_catcher for name in transfer.material_names]
+    out[:, NUM_GROUPS, 3] = transfer.stored_scene.is_two_sided
     emission = material_emissions(state.light, transfer.material_names, is_visible=True)
     out[:, NUM_GROUPS + 1, :3] = emission.view(np.int32)
     out[:, NUM_GROUPS + 1, 3] = material_textures[:, EMISSION]

@@ -10,8 +10,9 @@ from fastapi import Path as PathPart
 from fastapi.concurrency import run_in_threadpool
 
 from relume.assets.environments.built_in import BUILT_IN, load_built_in
-from relume.assets.environments.environment_store import STORE, EnvironmentRecord, get_record, records, thumbnail_path
+from relume.assets.environments.environment_store import STORE, thumbnail_path
 from relume.assets.environments.thumbnail import thumbnail
+from relume.assets.small_asset_store import SmallAssetRecord
 from relume_server.api.assets.upload import store_upload
 from relume_server.api.pagination import NameFilter, PageDep
 from relume_server.io.png import A_DAY, PngResponse
@@ -41,7 +42,7 @@ async def import_environment(
 def list_environments(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[EnvironmentBody]:
     """List the built-in environments, then the imported ones, newest first; filtered by name."""
     listed = [((0.0, float(index), example), _built_in_body(example)) for index, example in enumerate(BUILT_IN)]
-    imported = records(environments_path(services.settings.data))
+    imported = STORE.list_records(environments_path(services.settings.data))
     listed += [((1.0, -record.created, record.id), _body(record)) for record in imported]
     named = [(key, body) for key, body in listed if name in (None, body.name)]
     return [body for _, body in page.cut(named, lambda keyed: keyed[0])]
@@ -52,7 +53,7 @@ def get_environment(environment: AnyId, services: ServicesDep) -> EnvironmentBod
     """Return one environment."""
     if environment in BUILT_IN:
         return _built_in_body(environment)
-    return _body(get_record(environments_path(services.settings.data), environment))
+    return _body(STORE.get_record(environments_path(services.settings.data), environment))
 
 
 @router.get("/{environment}/thumbnail.png", response_class=PngResponse, name="get_environment_thumbnail")
@@ -88,10 +89,10 @@ def _built_in_body(name: str) -> EnvironmentBody:
     )
 
 
-def _body(record: EnvironmentRecord) -> EnvironmentBody:
+def _body(record: SmallAssetRecord) -> EnvironmentBody:
     return EnvironmentBody(
         id=record.id,
-        map=record.map,
+        map=record.reference,
         name=record.name,
         created=format_timestamp(record.created),
         warnings=list(record.warnings),

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.assets.ies.ies_store import IES_FILES, IesRecord, get_record, load_planes, records
+from relume.assets.ies.ies_store import IES_FILES, IesRecord, load_planes
 from relume_server.api.assets.in_use import remove_unused
 from relume_server.api.assets.upload import store_upload
 from relume_server.api.pagination import NameFilter, PageDep, records_page
@@ -36,13 +36,15 @@ async def import_ies(
 @router.get("")
 def list_ies(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[IesBody]:
     """List IES files, newest first, filtered by name."""
-    return [_body(record) for record in records_page(records(ies_path(services.settings.data)), name, page)]
+    return [
+        _body(record) for record in records_page(IES_FILES.list_records(ies_path(services.settings.data)), name, page)
+    ]
 
 
 @router.get("/{ies}")
 def get_ies(ies: Id, services: ServicesDep) -> IesBody:
     """Return one IES file."""
-    return _body(get_record(ies_path(services.settings.data), ies))
+    return _body(IES_FILES.get_record(ies_path(services.settings.data), ies))
 
 
 @router.delete("/{ies}", status_code=204)
@@ -55,11 +57,11 @@ async def delete_ies(ies: Id, services: ServicesDep) -> Response:
 def _body(record: IesRecord) -> IesBody:
     return IesBody(
         id=record.id,
-        profile=record.profile,
+        profile=record.reference,
         name=record.name,
         created=format_timestamp(record.created),
         candela=record.candela,
         emission=record.emission,
         warnings=list(record.warnings),
-        planes=load_planes(record.profile),
+        planes=load_planes(record.reference),
     )

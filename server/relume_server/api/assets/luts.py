@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, File, Form, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.luts.lut_store import LUTS, LutRecord, get_record, load_table, records
+from relume.luts.lut_store import LUTS, LutRecord, load_table
 from relume_server.api.assets.in_use import remove_unused
 from relume_server.api.assets.upload import store_upload
 from relume_server.api.color import LutResponse
@@ -38,13 +38,13 @@ async def import_lut(
 @router.get("")
 def list_luts(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[LutBody]:
     """List LUTs, newest first, filtered by name."""
-    return [_body(record) for record in records_page(records(luts_path(services.settings.data)), name, page)]
+    return [_body(record) for record in records_page(LUTS.list_records(luts_path(services.settings.data)), name, page)]
 
 
 @router.get("/{lut}")
 def describe_lut(lut: Id, services: ServicesDep) -> LutBody:
     """Return one LUT."""
-    return _body(get_record(luts_path(services.settings.data), lut))
+    return _body(LUTS.get_record(luts_path(services.settings.data), lut))
 
 
 @router.get("/{lut}/table", response_class=LutResponse)
@@ -57,7 +57,7 @@ def get_table(lut: Id) -> Response:
 async def delete_lut(lut: Id, services: ServicesDep) -> Response:
     """Delete a LUT, if no saved look, share link, session or job uses it."""
     folder = luts_path(services.settings.data)
-    record = await run_in_threadpool(get_record, folder, lut)
+    record = await run_in_threadpool(LUTS.get_record, folder, lut)
     await remove_unused(LUTS, folder, lut, "lut", services, called=f"LUT {record.name!r}")
     return Response(status_code=204)
 
@@ -65,7 +65,7 @@ async def delete_lut(lut: Id, services: ServicesDep) -> Response:
 def _body(record: LutRecord) -> LutBody:
     return LutBody(
         id=record.id,
-        lut=record.lut,
+        lut=record.reference,
         name=record.name,
         created=format_timestamp(record.created),
         size=record.size,
