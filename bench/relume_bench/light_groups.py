@@ -89,7 +89,7 @@ def _fader(folder: Path, num_lights: int, tiny: bool) -> Figure:
     for k in range(5 if tiny else 60):
         picture.set_look(_look(transfer.default_look, 1 + k / 60), active_pointer="/light_groups/Fader")
         start_time = time.perf_counter()
-        if k > 1:  # the first shades all, the second each source alone
+        if k > 0:  # the first shades all lights, and the group alone
             picture.encode(picture.advance(None).tiles, "rgb9e5")
             durations.append(1000 * (time.perf_counter() - start_time))
         while not picture.advance(None).exact or picture.next_job() is not None:
