@@ -143,7 +143,7 @@ def group_lights(
     solo_sources, groups = _solo_sources(look, solo), {}
     for group_name, group in look.light_groups.items():
         members = {name: look.lights[name] for name in group.lights}
-        lit = (each for name, each in members.items() if (each.enabled if solo is None else name in solo_sources))
+        lit = (m for name, m in members.items() if (m.enabled if solo_sources is None else name in solo_sources))
         sources = (LightSource(each.geometry, each.gain_in_group) for each in lit if any(each.gain_in_group))
         local = tuple(part for source in sources for part in _emitted_parts(source, images))
         if len(local) > 1:

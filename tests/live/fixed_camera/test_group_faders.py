@@ -139,4 +139,5 @@ def test_the_light_of_a_group_has_its_enabled_lights_or_those_shown_alone():
     off = {"Left": {"enabled": False}}
     assert [len(each.local) for each in light_of(GROUPS, off)[1].values()] == [2, 2]
     assert [len(each.local) for each in light_of(GROUPS, off, frozenset({"Left", "Top"}))[1].values()] == [2]
+    assert [len(each.local) for each in light_of(GROUPS, off, frozenset({"Removed"}))[1].values()] == [2, 2]
     assert "Back" not in light_of(GROUPS, {"Rim": {"intensity": 0.0}})[1]  # a single light needs no sum
