@@ -259,10 +259,17 @@ class _LightLook(_FrozenModel):
     @property
     def full_gain(self) -> Rgb:
         """Factor of each channel of an enabled light: intensity · color · emission, and those of its group."""
-        gain = [self.intensity * c * e for c, e in zip(self.color, self.emission, strict=True)]
-        if self._group is not None:
-            gain = [self._group.intensity * c * g for c, g in zip(self._group.color, gain, strict=True)]
-        red, green, blue = gain
+        if self._group is None:
+            return self.gain_in_group
+        red, green, blue = (
+            self._group.intensity * c * g for c, g in zip(self._group.color, self.gain_in_group, strict=True)
+        )
+        return red, green, blue
+
+    @property
+    def gain_in_group(self) -> Rgb:
+        """Factor of each channel of an enabled light without those of its group: intensity · color · emission."""
+        red, green, blue = (self.intensity * c * e for c, e in zip(self.color, self.emission, strict=True))
         return red, green, blue
 
     @property

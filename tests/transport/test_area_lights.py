@@ -15,7 +15,7 @@ from relume.brdf.term_validation import complete_term
 from relume.lights.light_sampling import NOT_FLAT_RADIUS, make_strata, split_axes
 from relume.lights.local_lights import make_emitter_parts, make_light_strata, prepare_local_lights, rectangle
 from relume.lights.spherical_triangles import NO_LIGHTS
-from relume.live.opened.local_lights import MESH_SAMPLE_FACTOR, SAMPLES
+from relume.live.opened.local_lights import FINE_SAMPLE_FACTOR, SAMPLES
 from relume.look import LightGeometry
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.local_light_visibility import trace_light_visibility
@@ -144,7 +144,7 @@ def test_a_partly_occluded_light_is_reflected():
         prepare_local_lights(MESH, make_emissive_triangles(panel_in(1, 1, *ends), False))
         for ends in ((0, 1), (-2.3, 3.1))
     )
-    of_panel, strata = floor_under(open_air), make_light_strata(behind, MESH_SAMPLE_FACTOR * SAMPLES)
+    of_panel, strata = floor_under(open_air), make_light_strata(behind, FINE_SAMPLE_FACTOR * SAMPLES)
     visibility = trace_light_visibility(blocks, behind, strata, of_panel.points)
     lit = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), visibility),))
     expected, actual = (

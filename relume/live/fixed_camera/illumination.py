@@ -27,6 +27,7 @@ Normals = tuple[NormalMap | None, ...]
 _UNIT_GAIN: Rgb = (1.0, 1.0, 1.0)
 _ZERO_GAIN: Rgb = (0.0, 0.0, 0.0)
 _NO_IMAGES: Mapping[LightGeometry, EmissionImage] = MappingProxyType({})
+_FACTOR_ROUNDING = 1e-9  # relative, of products of gains in float64
 _MAX_CACHED_LIGHTS = 64  # every update strategy asks for the gains of a frame's lights, for every term
 
 
@@ -129,10 +130,59 @@ def element_gains(light: Illumination) -> Mapping[Illumination, Rgb]:
     return MappingProxyType(gains)
 
 
+def group_lights(
+    look: Look, light: Illumination, solo: Solo = None, images: Mapping[LightGeometry, EmissionImage] = _NO_IMAGES
+) -> dict[str, Illumination]:
+    """Return the light of each light group with several sources alone, at intensity 1.
+
+    It stays equal while the group's fader moves, so its image serves the whole drag.
+
+    Args:
+        look, solo, images: as in `illumination_from_look`. light: its result.
+    """
+    solo_sources, groups = _solo_sources(look, solo), {}
+    for group_name, group in look.light_groups.items():
+        members = {name: look.lights[name] for name in group.lights}
+        lit = (m for name, m in members.items() if (m.enabled if solo_sources is None else name in solo_sources))
+        sources = (LightSource(each.geometry, each.gain_in_group) for each in lit if any(each.gain_in_group))
+        local = tuple(part for source in sources for part in _emitted_parts(source, images))
+        if len(local) > 1:
+            groups[group_name] = light._replace(local=local, environment_gain=_ZERO_GAIN)
+    return groups
+
+
 @lru_cache(maxsize=_MAX_CACHED_LIGHTS)
-def element_gain_changes(before: Illumination, after: Illumination) -> Mapping[Illumination, Rgb]:
-    """Return the difference of two lights as vectors over elements, without elements that are equal."""
-    old, new = element_gains(before), element_gains(after)
+def grouped_gains(light: Illumination, groups: tuple[Illumination, ...]) -> Mapping[Illumination, Rgb]:
+    """Return `element_gains`, with one element and light path for all lights of a group if their factor is equal.
+
+    Args:
+        groups: from `group_lights`; none: every source is an element.
+    """
+    gains = dict(element_gains(light))
+    for group in groups:
+        members = element_gains(group)
+        factor = _common_factor([gains.get(element, _ZERO_GAIN) for element in members], list(members.values()))
+        if factor is not None and any(factor):
+            gains = {element: gain for element, gain in gains.items() if element not in members}
+            gains |= dict.fromkeys(split_for_shading(group), factor)
+    return MappingProxyType(gains)
+
+
+def _common_factor(gains: Sequence[Rgb], unit_gains: Sequence[Rgb]) -> Rgb | None:
+    """Return the factor per channel between gains; None if there is none for all of them."""
+    scaled, unit = np.array(gains), np.array(unit_gains)
+    total = unit.sum(axis=0)
+    factor = np.divide(scaled.sum(axis=0), total, out=np.zeros(3), where=total > 0)
+    red, green, blue = factor.tolist()
+    return (red, green, blue) if np.allclose(scaled, factor * unit, rtol=_FACTOR_ROUNDING, atol=0) else None
+
+
+@lru_cache(maxsize=_MAX_CACHED_LIGHTS)
+def gain_changes(
+    before: Illumination, after: Illumination, groups: tuple[Illumination, ...]
+) -> Mapping[Illumination, Rgb]:
+    """Return the difference of two lights as vectors of `grouped_gains`, without elements that are equal."""
+    old, new = grouped_gains(before, groups), grouped_gains(after, groups)
     change = {e: _sum(new.get(e, _ZERO_GAIN), old.get(e, _ZERO_GAIN), -1.0) for e in {**old, **new}}
     return MappingProxyType({element: gain for element, gain in change.items() if any(gain)})
 

@@ -24,6 +24,7 @@ from relume.live.fixed_camera.illumination import (
     Solo,
     emission_images,
     geometries,
+    group_lights,
     illumination_from_look,
     images_by_material,
     is_solo,
@@ -86,6 +87,7 @@ class ViewImages:
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: the illumination. default_light: that of the scene's own look.
+        groups: light of each light group alone at intensity 1, see `group_lights`.
         gain: gain of the finished image. mirrors: the mirrors of the image.
         glass_factors: factors of the samples that preview edited glass, in the view's order; None for 1.
         region: visible pixels of the image: x, y, width, height; None: all.
@@ -97,7 +99,8 @@ class ViewImages:
         self.transfer, self.cache = transfer, cache
         self.view = transfer.views[view_name]
         self.default = validate(transfer.default_look, transfer.default_look)
-        self.light = self.default_light = self._illumination_from_look(self.default)
+        self.light, self.groups = self._lights_from_look(self.default)
+        self.default_light = self.light
         self.by_name = {
             name: MaterialImage(self.view, index, material_documents(self.default, name), self.light)
             for index, name in enumerate(transfer.material_names)
@@ -175,7 +178,7 @@ class ViewImages:
         Raises what `FixedViewTransfer.environment_radiance` and `LocalLightTransport.emission_image` raise; then
         nothing has changed.
         """
-        light = self._illumination_from_look(look, solo)
+        light, self.groups = self._lights_from_look(look, solo)
         if light != self.light:
             if light.environment.map is not None:
                 self.transfer.environment_radiance(light.environment.map)
@@ -246,11 +249,12 @@ class ViewImages:
             and live.document in material_documents(self.default, name)
         )
 
-    def _illumination_from_look(self, look: Look, solo: Solo = None) -> Illumination:
+    def _lights_from_look(self, look: Look, solo: Solo = None) -> tuple[Illumination, Mapping[str, Illumination]]:
         has_bounces, names = EditAxis.BOUNCES in self.transfer.axes, self.transfer.material_names
         images = emission_images(geometries(look), self.transfer.local.emission_image)
         self.transfer.local.check_links(links(look))
-        return illumination_from_look(look, names, has_bounces=has_bounces, solo=solo, images=images)
+        light = illumination_from_look(look, names, has_bounces=has_bounces, solo=solo, images=images)
+        return light, group_lights(look, light, solo, images)
 
     def _emission_pattern(self, material: int, image: EmissionImage | None) -> F32:
         """Emission of a material's samples relative to its mean; zero on sides that do not emit. (n, 1 or 3)"""

@@ -48,7 +48,8 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 SAMPLES = 64  # of a rectangle, per view sample
-MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # mesh lights have more samples, if the scene has few emissive materials
+FINE_SAMPLE_FACTOR = 4  # of mesh lights, if the scene has few emissive materials, and of many points
+MAX_FINE_MESHES = 4
 COARSE_SAMPLES = 16  # that stand for parts of a surface in narrow lobes
 LOBE_SAMPLES = 256  # of many points, a quarter of how many narrow lobes show: each is a highlight
 PREVIEW_SAMPLES = 4  # during an edit of the light
@@ -136,11 +137,13 @@ class LocalLights:
     def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
         """Return the number of samples of a light, given that of a rectangle; see `make_light_strata`.
 
-        A mesh has more: parts of it are often occluded, and its housing is close.
+        A mesh has more: parts of it are often occluded, and its housing is close. So have many points, of which the
+        close ones are far brighter than the others.
         """
         lights = self._store.attributes["look"]["lights"].values()
         has_few_meshes = sum(light["kind"] == "mesh" for light in lights) <= MAX_FINE_MESHES
-        return rectangle_samples * (MESH_SAMPLE_FACTOR if geometry.material_emissions and has_few_meshes else 1)
+        is_fine = geometry.kind == "points" or (geometry.material_emissions and has_few_meshes)
+        return rectangle_samples * (FINE_SAMPLE_FACTOR if is_fine else 1)
 
     def rays_to(
         self,

@@ -10,7 +10,6 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
-from relume.lights.local_lights import num_samples
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.look import LightGeometry
@@ -73,7 +72,8 @@ class MaterialSamples:
         """Return the rays of local lights, with cached shadows. points: the samples"""
 
         def cached_shadows(geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
-            num_bytes = len(points.position) * -(-num_samples(geometry, self.local.num_samples(geometry)) // 8)
+            _, strata = self.local.sample_light(geometry, self.local.num_samples(geometry))
+            num_bytes = len(points.position) * -(-len(strata.uv) // 8)
             return self.cache.get(
                 (*self.key, "shadows", geometry), ShadowCache, num_bytes, lambda: self.local.shadows(geometry, points)
             )

@@ -15,14 +15,16 @@ import { dissolveGroup, editGroup, groupPath, moveToGroup, renameGroup } from ".
 interface Props {
   name: string;
   group: LightGroupLook;
+  /** The list shows what was searched, so the group is open. */
+  isFiltered: boolean;
   /** The rows of its lights. */
   children: ComponentChildren;
 }
 
-export function LightGroupRow({ name, group, children }: Props) {
+export function LightGroupRow({ name, group, isFiltered, children }: Props) {
   const [target, setTarget] = useState(false);
   const section = `light group ${name}`;
-  const open = !foldedSections.value.includes(section);
+  const open = isFiltered || !foldedSections.value.includes(section);
   const drop = (event: DragEvent) => {
     setTarget(false);
     const light = event.dataTransfer?.getData(DRAGGED_LIGHT);

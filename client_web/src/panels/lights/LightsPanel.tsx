@@ -1,4 +1,5 @@
 /** The light mixer: light groups with their lights, then the other lights. */
+import { useState } from "preact/hooks";
 import { handlesOpen } from "../../state/display";
 import { look } from "../../state/look";
 import { foldedSections, toggleFolded } from "../../state/panels";
@@ -9,10 +10,12 @@ import { LightGroupRow } from "./LightGroupRow";
 import { LightRow } from "./LightRow";
 import { LIGHT_KINDS } from "./lightKinds";
 import { lights } from "./lightEdits";
-import { groupByPrefix, groupOfLight, lightGroups } from "./lightGroups";
+import { filterRows } from "./lightFilter";
+import { groupByPrefix, lightGroups } from "./lightGroups";
 import { isAddMenuOpen, placingKind, startPlacement, stopPlacement } from "./placement";
 
 const TITLE = "Lights";
+const MIN_FILTERED_LIGHTS = 12; // fewer are visible at once
 
 function LightKindMenu() {
   return (
@@ -50,21 +53,40 @@ function rowOf(name: string) {
 }
 
 export function LightsPanel() {
-  const all = Object.entries(lights.value);
+  const [text, setText] = useState("");
+  const names = Object.keys(lights.value);
+  const canFilter = names.length >= MIN_FILTERED_LIGHTS;
+  const filter = canFilter ? text.trim() : "";
+  const rows = filterRows(lightGroups.value, names, filter);
   return (
-    <Section title={TITLE} count={all.length} actions={<LightActions />}>
+    <Section title={TITLE} count={names.length} actions={<LightActions />}>
       {isAddMenuOpen.value && <LightKindMenu />}
-      {all.length === 0 && look.value !== null && !isAddMenuOpen.value && (
+      {names.length === 0 && look.value !== null && !isAddMenuOpen.value && (
         <p class="environment-text">No lights yet. Click + to add one.</p>
       )}
+      {canFilter && (
+        <input
+          class="light-filter"
+          type="search"
+          placeholder="Find"
+          aria-label="Find lights"
+          value={text}
+          onInput={(event) => setText(event.currentTarget.value)}
+        />
+      )}
       <ul class="lights">
-        {Object.entries(lightGroups.value).map(([name, group]) => (
-          <LightGroupRow key={`group ${name}`} name={name} group={group}>
-            {group.lights.map((light) => rowOf(light))}
+        {rows.groups.map(({ name, group, shown }) => (
+          <LightGroupRow key={`group ${name}`} name={name} group={group} isFiltered={filter !== ""}>
+            {shown.map((light) => rowOf(light))}
           </LightGroupRow>
         ))}
-        {all.map(([name]) => !groupOfLight.value.has(name) && rowOf(name))}
+        {rows.lights.map((name) => rowOf(name))}
       </ul>
+      {filter !== "" && rows.groups.length + rows.lights.length === 0 && (
+        <p class="environment-text" role="status">
+          No light or group is named like “{filter}”.
+        </p>
+      )}
     </Section>
   );
 }

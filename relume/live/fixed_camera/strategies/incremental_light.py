@@ -23,9 +23,9 @@ from relume.live.fixed_camera.illumination import (
     Illumination,
     LightSource,
     direct_from,
-    element_gains,
     is_same_environment,
     single_source,
+    split_for_shading,
 )
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback, ignore_result
 from relume.live.fixed_camera.live_term import LiveTerm
@@ -166,16 +166,19 @@ def _prefetch_job(situation: Situation) -> Job | None:
 
 
 def _source_image_job(situation: Situation) -> Job | None:
-    """Return the job for an image of the dragged light, of the material with the fewest samples first.
+    """Return the job for an image of the dragged light or light group, of the material with the fewest samples first.
 
     The direct image is subtracted when the light moves; the complete image serves changes of its gain. None if the
     light has moved already, or if the memory budget is used up.
     """
     images, targets = situation.images, situation.targets
     dragged = situation.control.dragged_light(situation.look)
-    if dragged is None or all(source.geometry != dragged for source in images.light.local):
+    light = situation.control.dragged_group(images.groups)
+    if any(source.geometry == dragged for source in images.light.local):
+        light = single_source(images.light, dragged)
+    if light is None:
         return None
-    elements = list(element_gains(single_source(images.light, dragged)))  # direct light comes first
+    elements = list(split_for_shading(light))  # direct light comes first
     missing = [(e, t) for e in elements for t in targets if images.image_in(t.material, t.live, e) is None]
     num_bytes = sum(shaded_bytes(target.material.num_samples) for _, target in missing)
     if not missing or num_bytes > images.cache.budget_bytes - images.cache.used_bytes:

@@ -2,23 +2,24 @@
 
     R' = R + Σ_e (g'_e − g_e) R_e,   or   R' = Σ_e g'_e R_e
 
-e are the elements of light (`element_gains`), and R_e the image of one element under the same curves, shaded once and
+e are the elements of light (`grouped_gains`), and R_e the image of one element under the same curves, shaded once and
 cached. The sum is exact, and a frame costs the sum of a few images. The formula with fewer missing sources is used: a
-soloed light needs no other source.
+soloed light needs no other source. While a group's fader moves, all its lights have one factor and are one element.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.displayed import UNIT_ROUNDOFF, DisplayedImage, norm_of, weighted_sum
 from relume.live.fixed_camera.fidelity import Fidelity
-from relume.live.fixed_camera.illumination import Illumination, element_gain_changes, element_gains, equal_up_to_gains
+from relume.live.fixed_camera.illumination import Illumination, equal_up_to_gains, gain_changes, grouped_gains
 from relume.live.fixed_camera.jobs import Job
 from relume.live.fixed_camera.strategies.resum import resum_job
 from relume.live.fixed_camera.strategies.shading import Shading
@@ -94,10 +95,13 @@ def _source_job(situation: Situation) -> Job | None:
 def _resum_job(situation: Situation) -> Job | None:
     """Return the job that sums a mixed image once from all its sources; None if images of sources are missing."""
     for target in situation.targets:
-        live, gains = target.live, element_gains(target.live.light)
+        live = target.live
         is_mixed = live.is_converged and live.ready.basis is None and live.ready.rounding > 0
-        if is_mixed and not live.changed_curves() and not _make_recipe(target, False, gains).missing:
-            weighted_images = _weighted_images(target, gains)
+        if not is_mixed or live.changed_curves():
+            continue
+        recipe = _best(_make_recipe(target, False, grouped_gains(live.light, groups)) for groups in _groupings(target))
+        if not recipe.missing:
+            weighted_images = _weighted_images(target, recipe.gains)
             key = target.images.image_key(target.material, live, live.light)
             return resum_job(target, key, partial(weighted_sum, weighted_images=weighted_images))
     return None
@@ -108,12 +112,27 @@ def _recipe(target: TermTarget, light: Illumination) -> _Recipe | None:
     reference = target.live.ready.reference
     if reference is None or reference.light is None or not equal_up_to_gains(reference.light, light):
         return None
-    change = _make_recipe(target, True, element_gain_changes(reference.light, light))
-    if not change.missing:
-        return change
-    whole = _make_recipe(target, False, element_gains(light))
-    best = min(change, whole, key=lambda recipe: recipe.num_missing_sources)
+    before, groupings = reference.light, _groupings(target)
+    changes = (_make_recipe(target, True, gain_changes(before, light, groups)) for groups in groupings)
+    sums = (_make_recipe(target, False, grouped_gains(light, groups)) for groups in groupings)
+    best = _best(chain(changes, sums))
     return best if not best.missing or _is_affordable(target, best) else None
+
+
+def _groupings(target: TermTarget) -> Iterable[tuple[Illumination, ...]]:
+    """Return the sets of groups whose lights may be one element: all groups, and none."""
+    groups = tuple(target.images.groups.values())
+    return (groups, ()) if groups else ((),)
+
+
+def _best(recipes: Iterable[_Recipe]) -> _Recipe:
+    """Return the first recipe with the fewest missing sources; no later one is made after a complete one."""
+    candidates = list[_Recipe]()
+    for recipe in recipes:
+        if not recipe.missing:
+            return recipe
+        candidates.append(recipe)
+    return min(candidates, key=lambda recipe: recipe.num_missing_sources)
 
 
 def _is_affordable(target: TermTarget, recipe: _Recipe) -> bool:
@@ -137,7 +156,7 @@ def _weighted_images(target: TermTarget, gains: Mapping[Illumination, Rgb]) -> l
 
 LINEAR_MIX = Strategy(
     name="linear mix",
-    needs="one image per light source",
+    needs="one image per light source, or light group",
     cost="a sum of images",
     fidelity=Fidelity.EXACT,
     changes_light=True,

@@ -84,6 +84,10 @@ class ActiveControl(NamedTuple):
         """True if it rotates the environment."""
         return self.pointer == ROTATION
 
+    def dragged_group(self, groups: Mapping[str, Illumination]) -> Illumination | None:
+        """Return the light of the group whose fader is dragged; None if none is. groups: see `ViewImages`"""
+        return groups.get(self.pointer.name) if isinstance(self.pointer, LightGroupPointer) else None
+
     def dragged_light(self, look: Look) -> LightGeometry | None:
         """Return the geometry of the local light that is dragged, as in a look; None if no light is."""
         light = look.lights.get(self.pointer.name) if isinstance(self.pointer, LightPointer) else None
