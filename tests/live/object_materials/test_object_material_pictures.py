@@ -1,0 +1,92 @@
+"""Object materials: pictures equal those of a scene whose objects have these materials from the start."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
+
+from relume.core.cache import Cache
+from relume.live.opened.openers import open_bake
+from relume.look import complete, validate
+from relume.methods.registry import METHODS
+from relume.output.render_image import render_image
+from relume.scene.model import Material
+from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
+
+SIZE = (64, 48)
+CAMERA = make_camera("front", [0.0, 1.6, 2.4], [0, 0.3, 0], 0.7)
+WHITE = ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)
+GOLD = (
+    {"model": "lambert", "color": [0.6, 0.4, 0.1]},
+    {"model": "blinn_phong", "color": [0.3, 0.2, 0.1], "params": {"exponent": 20.0}},
+)
+COPPER = (
+    {"model": "lambert", "color": [0.7, 0.05, 0.05]},
+    {"model": "blinn_phong", "color": [0.1, 0.1, 0.4], "params": {"exponent": 40.0}},
+)
+VASE = {"base": "Gold", "objects": ["vase"], "terms": list(COPPER)}
+POINT = {"kind": "point", "position": [0.5, 1.9, 0.6], "emission": [4.0, 4.0, 4.0]}
+
+
+def scene_with(vase):
+    """Two balls on a floor before a wall; the materials, and that of the left ball."""
+    radiance = np.full((32, 64, 3), 0.3, np.float32)
+    radiance[6:8, 10:12] = 60
+    floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
+    wall = quad("wall", [[-2, 0, -0.7], [2, 0, -0.7], [2, 2, -0.7], [-2, 2, -0.7]], 0)
+    balls = [sphere("vase", [-0.38, 0.36, 0], 0.35, vase, 24), sphere("bowl", [0.38, 0.36, 0], 0.35, 1, 24)]
+    materials = [Material("White", WHITE), Material("Gold", GOLD)]
+    materials += [Material("Copper", COPPER)] if vase == 2 else []
+    return make_tiny_scene(floor, wall, *balls, camera=CAMERA, environment=radiance, materials=materials)
+
+
+def open_bakes(method, folder):
+    """Bakes of the scene with one material for both balls, and with one for each."""
+    bakes = []
+    for vase in (1, 2):
+        recipe = Recipe(method, ("front",), SIZE, 200, num_probes=2000)
+        scene = scene_with(vase)
+        store = bake_in_process(METHODS[method], scene, recipe, folder / f"{vase}.zarr")
+        bakes.append((open_bake(store, Cache(1 << 30)), scene))
+    return bakes
+
+
+@pytest.fixture(scope="module", params=["direct", "gather", "probes"])
+def bakes(request, tmp_path_factory):
+    return open_bakes(request.param, tmp_path_factory.mktemp(request.param))
+
+
+@pytest.fixture(scope="module")
+def direct(tmp_path_factory):
+    return open_bakes("direct", tmp_path_factory.mktemp("direct"))
+
+
+def look_of(bake, materials=None, lights=None, **sections):
+    document = copy.deepcopy(complete({}, bake.default_look))
+    document["materials"].update(materials or {})
+    document["lights"].update(lights or {})
+    for name, fields in sections.items():
+        document[name].update(fields)
+    return validate(document, bake.default_look)
+
+
+def rms(image, expected):
+    return float(np.sqrt(np.mean((image - expected) ** 2) / np.mean(expected**2)))
+
+
+@pytest.mark.parametrize("show", ["direct", "all"])
+def test_picture_is_that_of_a_scene_with_the_material(bakes, show):
+    (bake, _), (expected_bake, _) = bakes
+    settings = {"transport": {"show": show}, "lights": {"A": POINT}}
+    before = render_image(bake, "front", look_of(bake, **settings))
+    image = render_image(bake, "front", look_of(bake, {"Copper": VASE}, **settings))
+    expected = render_image(expected_bake, "front", look_of(expected_bake, **settings))
+    assert rms(before, expected) > 0.1
+    # rays of patches and of samples differ between scenes
+    noise = 1e-5 if show == "direct" else 0.01
+    print(bake.method, show, rms(image, expected), rms(before, expected))
+    assert rms(image, expected) < noise
