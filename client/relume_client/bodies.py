@@ -734,6 +734,7 @@ class SceneMaterial(TypedDict):
     shadow_catcher: bool
     is_projected: bool
     is_glass: bool
+    objects: Sequence[str]
 
 
 class SceneUpdate(TypedDict):

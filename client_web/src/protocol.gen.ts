@@ -1097,7 +1097,7 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. `objects`: names of its objects, which looks give materials of their own; empty as `objects` of the scene. */
+/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. `objects`: names of its objects; empty as those of the scene. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];

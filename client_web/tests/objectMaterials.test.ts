@@ -3,6 +3,7 @@ import { beforeEach, expect, test, vi } from "vitest";
 import { editValue } from "../src/edit/edit";
 import { history } from "../src/edit/history";
 import { copyMaterial, pasteMaterial } from "../src/panels/scene/copyMaterial";
+import { undo } from "../src/panels/looks/undoRedo";
 import { addObject, makeUnique, rejoin, sharedObjects } from "../src/panels/inspector/objectMaterials";
 import type { MaterialLook, SceneBody } from "../src/protocol";
 import { look } from "../src/state/look";
@@ -56,14 +57,14 @@ test("another object joins the copy", () => {
   expect(sharedObjects(materials(), "Gold")).toEqual(["cup"]);
 });
 
-test("objects use the shared material again, and undo returns each step", () => {
+test("objects use the shared material again, and undo returns each step", async () => {
   makeUnique("Gold", "vase");
   const unique = materials();
   rejoin("Gold (vase)", unique["Gold (vase)"] as MaterialLook);
   expect(Object.keys(materials())).toEqual(["Gold", "Wall"]);
-  history.undo();
+  await undo();
   expect(materials()).toEqual(unique);
-  history.undo();
+  await undo();
   expect(Object.keys(materials())).toEqual(["Gold", "Wall"]);
 });
 

@@ -23,19 +23,20 @@ def assign_in_all_looks(scene: Scene, looks: Sequence[Look]) -> tuple[Scene, lis
     for base, each in sorted({key for owner in owners for key in owner}):
         shown = tuple(owner.get((base, each), base) for owner in owners)
         groups.setdefault((base, shown), []).append(each)
+    if not groups:
+        return scene, list(looks)
     names = dict.fromkeys((material.name for material in scene.materials), 1)
     scene_materials = tuple(names)
     materials = list[ObjectMaterial]()
     for (base, shown), objects in groups.items():
         name = unique_name(next(name for name in shown if name != base), names)
         materials.append(ObjectMaterial(name, base, tuple(objects)))
-    scene_looks = [
-        look.model_copy(
-            update={
-                "materials": {name: look.materials[name] for name in scene_materials}
-                | {m.name: look.materials[shown[k]] for m, (_, shown) in zip(materials, groups, strict=True)}
-            }
-        )
-        for k, look in enumerate(looks)
-    ]
+    scene_looks = list[Look]()
+    for k, look in enumerate(looks):
+        shown_materials = {name: look.materials[name] for name in scene_materials}
+        for material, (_, shown) in zip(materials, groups, strict=True):
+            fields = {"base": material.base, "objects": material.objects}
+            shown_materials[material.name] = look.materials[shown[k]].model_copy(update=fields)
+        # validated again, which links the object materials
+        scene_looks.append(Look.model_validate({**look.model_dump(), "materials": shown_materials}))
     return with_object_materials(scene, tuple(materials)), scene_looks

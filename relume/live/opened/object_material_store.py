@@ -133,16 +133,9 @@ class ObjectMaterialStore:
         """Return the materials of points. material: in the bake. position, normal: offset from the surface"""
         rows = np.flatnonzero(np.isin(material, self._bases))
         face = trace_rays(self._embree, position[rows], -normal[rows], STOP_AT_PARTIAL).face
-        is_same = (face >= 0) & (self._baked_face_material[face] == material[rows])
+        is_same = (face >= 0) & (self._store.read("scene/face_material")[face] == material[rows])
         out = material.copy()
         out[rows[is_same]] = self._face_material[face[is_same]]
-        return out
-
-    @property
-    def _baked_face_material(self) -> NDArray[np.int32]:
-        is_assigned = self._face_material >= len(self._names)
-        out = self._face_material.copy()
-        out[is_assigned] = np.array(self._bases)[self._face_material[is_assigned] - len(self._names)]
         return out
 
     def _assign_samples(self, prefix: str) -> None:
@@ -166,25 +159,22 @@ class ObjectMaterialStore:
         """Copy the probes and lattice nodes of assigned triangles, which may share them with others."""
         grid = {name: self._store.read(f"nodes/{name}") for name in ProbeGrid._fields}
         nodes = {name: self._store.read(f"nodes/{name}") for name in LatticeNodes._fields}
-        material = self._store.read("probes/material")
-        order = np.arange(len(material))
-        counts = num_nodes(grid["num_rows"].ravel())
+        material, node_index = self._store.read("probes/material"), grid["node_index"].copy()
+        order, counts = np.arange(len(material)), num_nodes(grid["num_rows"].ravel())
         for index in range(len(self._names), len(self._attributes["materials"])):
             is_assigned = np.repeat(np.repeat(self._face_material == index, 2), counts)
-            node, node_copy = np.unique(grid["node_index"][is_assigned], return_inverse=True)
-            grid["node_index"][is_assigned] = len(nodes["probe"]) + node_copy
-            probe, is_used = nodes["probe"][node], nodes["weight"][node] > 0
-            copied, copy = np.unique(probe[is_used], return_inverse=True)
-            probe[is_used] = len(order) + copy
-            nodes = {name: np.concatenate([values, values[node]]) for name, values in nodes.items()}
-            nodes["probe"][-len(node) :] = probe
-            order, material = (
-                np.append(order, copied),
-                np.append(material, np.full_like(material, index, shape=len(copied))),
-            )
+            node, node_copy = np.unique(node_index[is_assigned], return_inverse=True)
+            node_index[is_assigned] = len(nodes["probe"]) + node_copy
+            copies = {name: values[node] for name, values in nodes.items()}
+            is_used = copies["weight"] > 0
+            probe, probe_copy = np.unique(copies["probe"][is_used], return_inverse=True)
+            copies["probe"][is_used] = len(order) + probe_copy
+            nodes = {name: np.concatenate([values, copies[name]]) for name, values in nodes.items()}
+            order = np.append(order, probe)
+            material = np.append(material, np.full(len(probe), index, material.dtype))
         self._rows["probes/"] = order
-        self._arrays |= {f"nodes/{name}": values for name, values in (grid | nodes).items()}
-        self._arrays["probes/material"] = material
+        self._arrays |= {f"nodes/{name}": values for name, values in nodes.items()}
+        self._arrays |= {"nodes/node_index": node_index, "probes/material": material}
 
     def _check_mirrors(self, materials: Sequence[ObjectMaterial]) -> None:
         """Raise ParameterError if a base material is a mirror: the bake has traced what its surfaces show."""

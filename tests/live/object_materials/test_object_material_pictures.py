@@ -9,10 +9,13 @@ import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere
 
 from relume.core.cache import Cache
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.reference import reference_image
 from relume.scene.model import Material
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
@@ -88,5 +91,57 @@ def test_picture_is_that_of_a_scene_with_the_material(bakes, show):
     assert rms(before, expected) > 0.1
     # rays of patches and of samples differ between scenes
     noise = 1e-5 if show == "direct" else 0.01
-    print(bake.method, show, rms(image, expected), rms(before, expected))
     assert rms(image, expected) < noise
+
+
+def test_object_material_without_edits_changes_nothing(bakes):
+    (bake, _), _ = bakes
+    unchanged = {"Copper": {"base": "Gold", "objects": ["vase"]}}
+    lights = {"A": {**POINT, "link": {"include": {"materials": ["Gold"]}}}}
+    before, after = (render_image(bake, "front", look_of(bake, each, lights)) for each in (None, unchanged))
+    assert rms(after, before) < 1e-5
+
+
+def test_assigned_picture_of_a_session_returns_to_the_shared_material(direct):
+    (bake, _), _ = direct
+    picture = Picture(bake, "front", bake.cache)
+    images = []
+    for materials in (None, {"Copper": VASE}, None, {"Copper": {**VASE, "objects": ["bowl", "vase"]}}):
+        look = look_of(bake, materials)
+        picture.check(look)
+        picture.set_look(look)
+        render_exact(picture, look, lambda share: None, lambda: False)
+        images.append(picture.image())
+    np.testing.assert_allclose(images[2], images[0], rtol=1e-6)
+    np.testing.assert_allclose(images[1], render_image(bake, "front", look_of(bake, {"Copper": VASE})), rtol=1e-6)
+    assert min(rms(images[1], images[0]), rms(images[3], images[1])) > 0.05
+
+
+def test_prepared_control_of_an_object_material_is_edited_live(direct):
+    (bake, _), _ = direct
+    picture = Picture(bake, "front", bake.cache)
+    picture.set_look(look_of(bake, {"Copper": VASE}))
+    pointer = "/materials/Copper/terms/1/params/exponent"
+    picture.prepare(pointer)
+    terms = [COPPER[0], {**COPPER[1], "params": {"exponent": 90.0}}]
+    look = look_of(bake, {"Copper": {**VASE, "terms": terms}})
+    picture.set_look(look, active_pointer=pointer)
+    render_exact(picture, look, lambda share: None, lambda: False)
+    np.testing.assert_allclose(picture.image(), render_image(bake, "front", look), rtol=1e-6)
+
+
+@pytest.mark.parametrize("objects", [["jug"], ["vase", "floor"]])
+def test_object_without_the_base_material_is_an_error_and_the_picture_stays(bakes, objects):
+    (bake, _), _ = bakes
+    with pytest.raises(ParameterError, match="'bowl', 'vase'"):
+        render_image(bake, "front", look_of(bake, {"Copper": {**VASE, "objects": objects}}))
+
+
+def test_reference_has_the_material_on_the_object(direct):
+    (bake, scene), (expected_bake, expected_scene) = direct
+    looks = look_of(bake, {"Copper": VASE}), look_of(expected_bake)
+    image, expected = (
+        reference_image(each, "front", look, SIZE, 0) for each, look in zip((scene, expected_scene), looks, strict=True)
+    )
+    plain = reference_image(scene, "front", look_of(bake), SIZE, 0)
+    assert rms(image, expected) < 0.02 < 0.1 < rms(plain, expected)
