@@ -27,7 +27,6 @@ const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>
 /** True if the server draws the image: a material has a BTF or a tri-planar texture, or is one of some objects. */
 export const usesTexelShading = computed(() =>
   Object.entries(look.value?.materials ?? {}).some(
-    ([name, material]) =>
-      material.base != null || material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material),
+    ([name, material]) => material.base != null || material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material),
   ),
 );

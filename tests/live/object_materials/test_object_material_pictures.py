@@ -89,8 +89,8 @@ def test_picture_is_that_of_a_scene_with_the_material(bakes, show):
     image = render_image(bake, "front", look_of(bake, {"Copper": VASE}, **settings))
     expected = render_image(expected_bake, "front", look_of(expected_bake, **settings))
     assert rms(before, expected) > 0.1
-    # rays of patches and of samples differ between scenes
-    noise = 1e-5 if show == "direct" else 0.01
+    # bakes of both scenes trace other rays: visibility is predicted from samples that are neighbors by material
+    noise = 1e-4 if show == "direct" and bake.method != "probes" else 0.01
     assert rms(image, expected) < noise
 
 
@@ -99,7 +99,7 @@ def test_object_material_without_edits_changes_nothing(bakes):
     unchanged = {"Copper": {"base": "Gold", "objects": ["vase"]}}
     lights = {"A": {**POINT, "link": {"include": {"materials": ["Gold"]}}}}
     before, after = (render_image(bake, "front", look_of(bake, each, lights)) for each in (None, unchanged))
-    assert rms(after, before) < 1e-5
+    np.testing.assert_allclose(after, before, rtol=1e-5, atol=1e-6)
 
 
 def test_assigned_picture_of_a_session_returns_to_the_shared_material(direct):
