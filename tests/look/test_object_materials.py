@@ -120,8 +120,8 @@ def test_export_has_the_object_materials_of_all_looks():
     """A variant without an object material has its base there."""
     scene = scene_of()
     vase = validate({"materials": {"V": {**VASE, "terms": [RED]}}}, DEFAULT)
-    both = validate({"materials": {"B": {"base": "Gold", "objects": ["bowl", "vase"], "terms": [RED]}}}, DEFAULT)
-    export = prepare_export(scene, vase, {"both": both, "plain": validate({}, DEFAULT)})
+    shared = validate({"materials": {"B": {"base": "Gold", "objects": ["bowl", "vase"], "terms": [RED]}}}, DEFAULT)
+    export = prepare_export(scene, vase, {"both": shared, "plain": validate({}, DEFAULT)})
     names = [export.materials[mesh.material].name for mesh in export.scene.meshes]
     assert names == ["V", "B", "Wall"]
 

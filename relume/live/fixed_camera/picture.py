@@ -28,7 +28,7 @@ from relume.live.fixed_camera.strategies.strategy import ActiveControl, HeldCont
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages, material_documents
 from relume.look import Look
 from relume.look.glass import glass_of
-from relume.look.object_materials import object_materials_of
+from relume.look.object_materials import ObjectMaterials, object_materials_of
 from relume.operators.shade import shaded_bytes
 from relume.views.resolve import encode, encode_coverage, resolve
 from relume.views.view import Tile
@@ -118,7 +118,7 @@ class Picture:
                 environment or an image is not available. StoreError: the bake is too old for images.
                 ResultUnavailableError: see `check`. The picture is unchanged.
         """
-        if object_materials_of(look) != self._images.transfer.object_materials:
+        if object_materials_of(look) != self.object_materials:
             self._assign_objects(look, active_pointer, solo)
             return
         self._glass.check(glass_of(look))
@@ -154,6 +154,11 @@ class Picture:
             material.set_view(images.view)
         self._background = Background(images)
         self._scheduler.adopt(images)
+
+    @property
+    def object_materials(self) -> ObjectMaterials:
+        """Object materials of the displayed bake."""
+        return self._images.transfer.object_materials
 
     def look_at(self, region: Tile | None) -> None:
         """Set the visible region, which becomes exact first: x, y, width, height in pixels; None: all."""
@@ -197,6 +202,8 @@ class Picture:
 
     def _show(self, traced: TracedView, picture: Picture) -> None:
         """Show another picture of the same look's glass instead, and continue with it."""
+        if traced.transfer.object_materials != self.object_materials:  # assigned since the view was requested
+            return
         picture.set_look(self._look, solo=self._solo)
         picture.look_at(self._images.region)
         self._glass.show(traced)

@@ -84,7 +84,7 @@ class ProgressivePicture:
             ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
         """
         static_picture = self._static_picture if self._has_indirect or not _has_indirect(look) else None
-        if self._look is not None and object_materials_of(look) != object_materials_of(self._look):
+        if static_picture is not None and static_picture.object_materials != object_materials_of(look):
             static_picture = None
         if static_picture is not None:  # first, because it rejects every look that the other rejects
             static_picture.set_look(look, active_pointer=active_pointer, solo=solo)
@@ -164,6 +164,8 @@ class ProgressivePicture:
             self._is_idle = False
             return
         static_picture = result.picture
+        if static_picture.object_materials != object_materials_of(self._look):  # the next job traces them
+            return
         self._moving_error = result.error if request[1] == self._look_seq else None
         if _has_indirect(self._look) and not has_indirect:  # requested meanwhile; the next job reuses the traced view
             return

@@ -140,7 +140,7 @@ class BakedFixedViews:
 
     @cached_property
     def _assigned(self) -> WeakValueDictionary[ObjectMaterials, Self]:
-        """The same bake with object materials, as long as an image uses it."""
+        """Open bakes with object materials, as long as an image uses them."""
         return WeakValueDictionary()
 
     def _assign(self, store: ObjectMaterialStore, key: str, materials: ObjectMaterials) -> Self:
