@@ -15,7 +15,7 @@ from typing_extensions import TypedDict  # pydantic requires it before Python 3.
 from relume.brdf.texture_slots import NormalMap
 from relume.image_io.display_transform import DisplayTransform
 from relume.image_io.ocio.view import OcioView
-from relume.look.object_materials import link_object_materials
+from relume.look.object_links import link_object_materials
 from relume.luts.lut_store import load_table
 
 Rgb = tuple[float, float, float]

@@ -11,15 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from relume.core.digest import digest
 from relume.core.errors import Description
 from relume.core.validation import Pointer, invalid_value, names_text
+from relume.look.model import Look
 from relume.scene.model import Scene
-
-if TYPE_CHECKING:
-    from relume.look.model import Look
 
 MAX_OBJECT_MATERIALS = 64  # each has samples, operators and tables of its own
 MAX_OBJECTS = 10_000
@@ -107,34 +105,6 @@ def check_not_emissive(materials: Mapping[str, Any], emissive: Iterable[str]) ->
         if fields.get("base") in emissive_names:
             allowed = "a material that emits no light; the light belongs to all of its objects"
             raise invalid_value(("materials", name, "base"), fields["base"], allowed)
-
-
-def link_object_materials(document: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a complete look whose links name the object materials of each base material that they name."""
-    names: dict[str, list[str]] = {}
-    for name, material in document["materials"].items():
-        base = material.get("base") if isinstance(material, Mapping) else material.base
-        if base is not None:
-            names.setdefault(base, []).append(name)
-    if not names:
-        return document
-    environment, lights = document["environment"], document["lights"]
-    return {
-        **document,
-        "environment": _linked(environment, names),
-        "lights": {name: _linked(light, names) for name, light in lights.items()},
-    }
-
-
-def _linked(source: Mapping[str, Any], names: Mapping[str, list[str]]) -> Mapping[str, Any]:
-    """Return a light or the environment with more names in its links. names: object materials by base"""
-    linked = {}
-    for field in ("link", "shadow_link"):
-        for mode, surfaces in (source.get(field) or {}).items():
-            bases = surfaces.get("materials", ())
-            added = [name for base in bases for name in names.get(base, ())]
-            linked[field] = {mode: {**surfaces, "materials": [*bases, *added]}}
-    return {**source, **linked}
 
 
 def check_objects(material: ObjectMaterial, owned: Collection[str]) -> None:

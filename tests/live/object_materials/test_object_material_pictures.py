@@ -35,14 +35,14 @@ VASE = {"base": "Gold", "objects": ["vase"], "terms": list(COPPER)}
 POINT = {"kind": "point", "position": [0.5, 1.9, 0.6], "emission": [4.0, 4.0, 4.0]}
 
 
-def scene_with(vase):
-    """Two balls on a floor before a wall; the materials, and that of the left ball."""
+def scene_with(vase, gold=GOLD):
+    """Two balls on a floor before a wall. vase: material of the left ball. gold: terms of that of the right one"""
     radiance = np.full((32, 64, 3), 0.3, np.float32)
     radiance[6:8, 10:12] = 60
     floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     wall = quad("wall", [[-2, 0, -0.7], [2, 0, -0.7], [2, 2, -0.7], [-2, 2, -0.7]], 0)
     balls = [sphere("vase", [-0.38, 0.36, 0], 0.35, vase, 24), sphere("bowl", [0.38, 0.36, 0], 0.35, 1, 24)]
-    materials = [Material("White", WHITE), Material("Gold", GOLD)]
+    materials = [Material("White", WHITE), Material("Gold", gold)]
     materials += [Material("Copper", COPPER)] if vase == 2 else []
     return make_tiny_scene(floor, wall, *balls, camera=CAMERA, environment=radiance, materials=materials)
 
@@ -145,3 +145,11 @@ def test_reference_has_the_material_on_the_object(direct):
     )
     plain = reference_image(scene, "front", look_of(bake), SIZE, 0)
     assert rms(image, expected) < 0.02 < 0.1 < rms(plain, expected)
+
+
+def test_mirror_cannot_be_a_base(tmp_path):
+    chrome = ({"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.02, "f0": 0.9}},)
+    recipe = Recipe("direct", ("front",), SIZE, 64)
+    bake = open_bake(bake_in_process(METHODS["direct"], scene_with(1, chrome), recipe, tmp_path / "a"), Cache(1 << 28))
+    with pytest.raises(ParameterError, match="no mirror in the scene"):
+        render_image(bake, "front", look_of(bake, {"Copper": VASE}))
