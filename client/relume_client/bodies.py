@@ -419,6 +419,8 @@ class MaterialLook(TypedDict):
     normal_map: NotRequired[NormalMapLook | None]
     glass: NotRequired[GlassLook | None]
     basis_functions: NotRequired[Literal[1, 3, 6, 10, 15, 21, 28, 36] | None]
+    base: NotRequired[str | None]
+    objects: NotRequired[Sequence[str]]
 
 
 class MeshLook(TypedDict):
@@ -734,6 +736,7 @@ class SceneMaterial(TypedDict):
     shadow_catcher: bool
     is_projected: bool
     is_glass: bool
+    objects: Sequence[str]
 
 
 class SceneUpdate(TypedDict):

@@ -113,13 +113,15 @@ export interface Look {
   display: DisplayLook;
 }
 
-/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it. `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate. */
+/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it. `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate. `base` and `objects`: of a material that the look adds; it is that of these objects instead of the scene's material `base`. Null for materials of the scene. */
 export interface MaterialLook {
   terms: TermLook[];
   shadow_catcher?: boolean;
   normal_map?: NormalMapLook | null;
   glass?: GlassLook | null;
   basis_functions?: 1 | 3 | 6 | 10 | 15 | 21 | 28 | 36 | null;
+  base?: string | null;
+  objects?: string[];
 }
 
 /** All surfaces of a material emit and are visible; emission is radiance. `image`: an uploaded image, "image:<id>", by which they emit: radiance is emission times its linear RGB. None: they emit as in the scene. */

@@ -1097,13 +1097,14 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. */
+/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. `objects`: names of its objects; empty as those of the scene. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
   shadow_catcher: boolean;
   is_projected: boolean;
   is_glass: boolean;
+  objects: string[];
 }
 
 /** Shader constants of a look, besides arrays. `gain`: of the image; `environment_gain`, `background_gain`: of the prefiltered environment for lobes, and of the background, per channel. `environment_rotation`: added to u. `environment_mips`: first texel, height and width of each. `bright_lights`: bright environment lights, which lobes evaluate separately: direction, radiance, spread. `shows_direct`: direct light and the background are visible. `arrays`: those in the payload; all others are unchanged. */

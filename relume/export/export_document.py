@@ -10,6 +10,7 @@ from relume.core.errors import ParameterError
 from relume.core.import_warnings import quote
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial, MaterialExporter
+from relume.export.export_objects import assign_in_all_looks
 from relume.look import Look, default_look, validate
 from relume.look.light_mix import expand_light_mix
 from relume.look.model import AreaLook, SingleLightLook
@@ -80,8 +81,9 @@ def prepare_export(
     images = ExportImages()
     if not has_materials:
         return ExportDocument(scene, look, [], {name: [] for name in variants}, images)
+    scene, (look, *others) = assign_in_all_looks(scene, [look, *variants.values()])
     exporter = MaterialExporter(scene, images)
-    by_variant = {name: exporter.materials(each) for name, each in variants.items()}
+    by_variant = {name: exporter.materials(each) for name, each in zip(variants, others, strict=True)}
     return ExportDocument(scene, look, exporter.materials(look), by_variant, images)
 
 

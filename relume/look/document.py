@@ -24,9 +24,10 @@ from relume.image_io.white_balance import NEUTRAL_TEMPERATURE, TEMPERATURES, TIN
 from relume.look.glass import complete_glass, default_glass
 from relume.look.light_groups import complete_light_groups, default_light_groups
 from relume.look.light_mix import expand_light_mix
-from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
+from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights, emissive_materials
 from relume.look.link_validation import check_link
 from relume.look.model import BackgroundKind, BasisFunctions, Look, PathFilter, ToneMap
+from relume.look.object_materials import check_not_emissive, default_materials
 from relume.luts.lut_store import LUTS
 from relume.scene.model import Light, Material
 
@@ -111,9 +112,11 @@ def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping
     """
     check_object((), partial, _SECTIONS)
     lights = complete_lights(partial.get("lights", {}), default["lights"], previous["lights"], default["materials"])
+    materials = _complete_materials(partial.get("materials", {}), default["materials"], previous["materials"])
+    check_not_emissive(materials, (name for light in lights.values() for name in emissive_materials(light)))
     default_groups = default.get("light_groups", {})  # older stores have no groups
     return {
-        "materials": _complete_materials(partial.get("materials", {}), default["materials"], previous["materials"]),
+        "materials": materials,
         "environment": _complete_environment(
             partial.get("environment", {}), default["environment"], previous["environment"], default["materials"]
         ),
@@ -128,12 +131,16 @@ def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping
 
 
 def _complete_materials(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
-    _check_names(("materials",), partial, default, "material")
-    return {name: _complete_material(name, partial.get(name, default[name]), default, previous) for name in default}
+    if not isinstance(partial, Mapping):
+        raise invalid_value(("materials",), partial, "an object with a field for each material to change")
+    defaults = default_materials(partial, default)
+    _check_names(("materials",), partial, defaults, "material")
+    return {name: _complete_material(name, partial.get(name, defaults[name]), defaults, previous) for name in defaults}
 
 
 def _complete_material(name: str, partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> Any:
-    if partial is previous[name] or partial is default[name]:
+    before = previous.get(name, default[name])
+    if partial is before or partial is default[name]:
         return partial
     pointer: Pointer = ("materials", name)
     # only a ground has `shadow_catcher`, and only glass has `glass`
@@ -145,7 +152,7 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
     functions = _complete_basis_functions((*pointer, "basis_functions"), fields.pop("basis_functions"))
     return {
         **fields,
-        "terms": _complete_terms((*pointer, "terms"), fields["terms"], previous[name]["terms"]),
+        "terms": _complete_terms((*pointer, "terms"), fields["terms"], before["terms"]),
         **normals,
         **glass,
         **functions,

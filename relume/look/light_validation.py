@@ -82,7 +82,7 @@ def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> di
         if not isinstance(kind, str) or kind not in _KIND_DEFAULTS:
             raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(_KIND_DEFAULTS)}")
         documents[light.name] = _merge(pointer, light.fields, default_light(kind))
-        for material in _emissive_materials(documents[light.name]):
+        for material in emissive_materials(documents[light.name]):
             if material not in material_names:
                 raise invalid_value((*pointer, "material"), material, names_text(material_names))
         _check_links(light.name, documents[light.name], material_names)
@@ -114,8 +114,8 @@ def complete_lights(
     return lights
 
 
-def _emissive_materials(light: Mapping[str, Any]) -> list[str]:
-    """The materials whose surfaces emit a light."""
+def emissive_materials(light: Mapping[str, Any]) -> list[str]:
+    """Return the materials whose surfaces emit a light. light: a complete one"""
     return [light["material"]] if light["kind"] == "mesh" else [name for name, _ in light.get("materials", ())]
 
 
@@ -126,7 +126,7 @@ def _check_links(name: str, light: Mapping[str, Any], material_names: Collection
 
 def _check_materials(lights: Mapping[str, Any], default: Mapping[str, Any], material_names: Collection[str]) -> None:
     """Require that each mesh light that a look adds has a material of its own."""
-    used = {material: name for name in default for material in _emissive_materials(lights[name])}
+    used = {material: name for name in default for material in emissive_materials(lights[name])}
     for name in (name for name in lights if name not in default and lights[name]["kind"] == "mesh"):
         material, pointer = lights[name]["material"], ("lights", name, "material")
         if not isinstance(material, str) or material not in material_names:

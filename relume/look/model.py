@@ -5,7 +5,8 @@ Terms stay dictionaries, so that `relume.brdf.curves` handles looks and their JS
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, NotRequired, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple, NotRequired, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic.dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing_extensions import TypedDict  # pydantic requires it before Python 3.
 from relume.brdf.texture_slots import NormalMap
 from relume.image_io.display_transform import DisplayTransform
 from relume.image_io.ocio.view import OcioView
+from relume.look.object_links import link_object_materials
 from relume.luts.lut_store import load_table
 
 Rgb = tuple[float, float, float]
@@ -93,6 +95,10 @@ class GlassLook(_FrozenModel):
     ior: float
 
 
+Names = Annotated[tuple[str, ...], AfterValidator(lambda names: tuple(sorted(set(names))))]
+"""A set of names: equal sets are equal keys of a cache."""
+
+
 class MaterialLook(_FrozenModel):
     """A material: the sum of its terms.
 
@@ -100,6 +106,8 @@ class MaterialLook(_FrozenModel):
     `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it.
     `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out
     factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate.
+    `base` and `objects`: of a material that the look adds; it is that of these objects instead of the scene's material
+    `base`. Null for materials of the scene.
     """
 
     terms: tuple[TermLook, ...]
@@ -107,16 +115,14 @@ class MaterialLook(_FrozenModel):
     normal_map: NormalMapLook | None = None
     glass: GlassLook | None = None
     basis_functions: BasisFunctions | None = None
+    base: str | None = None
+    objects: Names = ()
 
     @property
     def normals(self) -> NormalMap | None:
         """The normal map override; none for a shadow catcher, which hides its own surface."""
         normal_map = None if self.shadow_catcher else self.normal_map
         return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale)
-
-
-Names = Annotated[tuple[str, ...], AfterValidator(lambda names: tuple(sorted(set(names))))]
-"""A set of names: equal sets are equal keys of a cache."""
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -512,6 +518,11 @@ class Look(_FrozenModel):
     light_groups: dict[str, LightGroupLook]
     transport: TransportLook
     display: DisplayLook
+
+    @model_validator(mode="before")
+    @classmethod
+    def _link_object_materials(cls, document: Any) -> Any:
+        return link_object_materials(document) if isinstance(document, Mapping) else document
 
     @model_validator(mode="after")
     def _group_lights(self) -> Self:

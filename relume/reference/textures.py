@@ -15,6 +15,7 @@ from relume.images.image_store import load_normal_map, load_roughness_map, load_
 from relume.look import Look
 from relume.look.glass import glass_of, with_glass
 from relume.look.model import MeshLook
+from relume.look.object_materials import object_materials_of, with_object_materials
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Material, Mesh, Scene
@@ -24,12 +25,12 @@ F32 = NDArray[np.float32]
 
 
 def with_overrides(scene: Scene, look: Look) -> Scene:
-    """Apply the normal maps, emission images and glass of a look to a scene, as if its file contained them.
+    """Apply the materials of objects, normal maps, emission images and glass of a look, as if the file contained them.
 
     Args:
         scene: any. look: the look.
     """
-    scene = with_glass(scene, glass_of(look))
+    scene = with_glass(with_object_materials(scene, object_materials_of(look)), glass_of(look))
     images = {light.material: light.image for light in look.lights.values() if isinstance(light, MeshLook)}
     materials = tuple(_with_maps(material, look, images.get(material.name)) for material in scene.materials)
     if all(material is own for material, own in zip(materials, scene.materials, strict=True)):

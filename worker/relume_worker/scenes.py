@@ -80,6 +80,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
 
 def summarize_scene(scene: Scene) -> dict[str, Any]:
     """Summarize a scene for lists, with its name."""
+    listed = scene.meshes if len(scene.meshes) <= MAX_LISTED_OBJECTS else ()
     return {
         "name": scene.name,
         "views": [camera.name for camera in scene.cameras],
@@ -91,14 +92,15 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
                 "shadow_catcher": material.shadow_catcher,
                 "is_projected": is_triplanar,
                 "is_glass": material.glass is not None,
+                "objects": list(dict.fromkeys(mesh.name for mesh in listed if mesh.material == index)),
             }
-            for material, is_triplanar in zip(scene.materials, find_triplanar(scene), strict=True)
+            for index, (material, is_triplanar) in enumerate(zip(scene.materials, find_triplanar(scene), strict=True))
         ],
         "warnings": [warning.document() for warning in scene.warnings],
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
-        "objects": [mesh.name for mesh in scene.meshes] if len(scene.meshes) <= MAX_LISTED_OBJECTS else [],
+        "objects": [mesh.name for mesh in listed],
         "import_options": scene.import_options,
         "size": _size(scene),
     }

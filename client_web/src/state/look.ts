@@ -24,9 +24,9 @@ export const isBtfTerm = (term: Term): boolean => term.model === "measured_btf";
 const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>
   materialOf(name)?.is_projected === true &&
   ((normal_map ?? null) !== null || terms.some(({ texture }) => isImageReference(texture)));
-/** True if any material has a BTF or a tri-planar texture. */
+/** True if the server draws the image: a material has a BTF or a tri-planar texture, or is one of some objects. */
 export const usesTexelShading = computed(() =>
   Object.entries(look.value?.materials ?? {}).some(
-    ([name, material]) => material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material),
+    ([name, material]) => material.base != null || material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material),
   ),
 );

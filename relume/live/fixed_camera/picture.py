@@ -28,6 +28,7 @@ from relume.live.fixed_camera.strategies.strategy import ActiveControl, HeldCont
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages, material_documents
 from relume.look import Look
 from relume.look.glass import glass_of
+from relume.look.object_materials import ObjectMaterials, object_materials_of
 from relume.operators.shade import shaded_bytes
 from relume.views.resolve import encode, encode_coverage, resolve
 from relume.views.view import Tile
@@ -76,6 +77,7 @@ class Picture:
         is_watched: bool = False,
         make_static_view: StaticViewFactory | None = None,
     ) -> None:
+        self._transfer, self._view_name, self._make_static_view = transfer, view_name, make_static_view
         self._images = ViewImages(transfer, view_name, cache)
         self._view = self._images.view
         self._look = self._images.default
@@ -99,7 +101,9 @@ class Picture:
         """
         self._glass.check(glass_of(look))
         check_btfs_fit(term for material in look.materials.values() for term in material.terms)
-        samples = ((m.num_samples, len(material_documents(look, name))) for name, m in self._images.by_name.items())
+        # an image for other object materials has about as many samples
+        images = ((name, material) for name, material in self._images.by_name.items() if name in look.materials)
+        samples = ((material.num_samples, len(material_documents(look, name))) for name, material in images)
         self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
 
     def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
@@ -114,6 +118,9 @@ class Picture:
                 environment or an image is not available. StoreError: the bake is too old for images.
                 ResultUnavailableError: see `check`. The picture is unchanged.
         """
+        if object_materials_of(look) != self.object_materials:
+            self._assign_objects(look, active_pointer, solo)
+            return
         self._glass.check(glass_of(look))
         edited = None if active_pointer is None else parse_pointer(active_pointer)
         before, images = self._images.light, self._images.view_with_overrides(look)
@@ -126,6 +133,20 @@ class Picture:
             self._prepared_pointer = None  # the user edits a light now
         self._look, self._solo, self._glass.target = look, solo, glass_of(look)
 
+    def _assign_objects(self, look: Look, active_pointer: str | None, solo: Solo) -> None:
+        """Show a look with other object materials, whose samples are sorted anew; it has no images yet."""
+        materials, make_static_view = object_materials_of(look), self._make_static_view
+        if make_static_view is not None:
+            make_static_view = partial(make_static_view, object_materials=materials)
+        args = self._transfer.with_object_materials(materials), self._view_name, self._images.cache
+        picture = Picture(*args, is_watched=self._is_watched, make_static_view=make_static_view)
+        picture.set_look(look, active_pointer=active_pointer, solo=solo)
+        picture.look_at(self._images.region)
+        self._glass, self._look, self._solo = picture._glass, look, solo
+        self._prepared_pointer, self._edited_pointer = None, picture._edited_pointer
+        self._active_pointer = picture._active_pointer
+        self._adopt(picture)
+
     def _switch_images(self, images: ViewImages) -> None:
         """Replace the images with others of the same view."""
         self._images, self._view = images, images.view
@@ -133,6 +154,11 @@ class Picture:
             material.set_view(images.view)
         self._background = Background(images)
         self._scheduler.adopt(images)
+
+    @property
+    def object_materials(self) -> ObjectMaterials:
+        """Object materials of the displayed bake."""
+        return self._images.transfer.object_materials
 
     def look_at(self, region: Tile | None) -> None:
         """Set the visible region, which becomes exact first: x, y, width, height in pixels; None: all."""
@@ -176,9 +202,15 @@ class Picture:
 
     def _show(self, traced: TracedView, picture: Picture) -> None:
         """Show another picture of the same look's glass instead, and continue with it."""
+        if traced.transfer.object_materials != self.object_materials:  # assigned since the view was requested
+            return
         picture.set_look(self._look, solo=self._solo)
         picture.look_at(self._images.region)
         self._glass.show(traced)
+        self._adopt(picture)
+
+    def _adopt(self, picture: Picture) -> None:
+        """Continue with the images of another picture."""
         self._images, self._view, self._radiance = picture._images, picture._view, picture._radiance
         self._background, self._scheduler = picture._background, picture._scheduler
         self._gain = np.full(3, -1.0)  # every pixel is new

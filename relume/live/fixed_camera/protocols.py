@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.look import EnvironmentKey, LightGeometry
     from relume.look.glass import GlassOfLook
     from relume.look.model import Link
+    from relume.look.object_materials import ObjectMaterials
     from relume.operators.image_cache import ImageFiles
     from relume.raytrace.moving_light import MovingLight
     from relume.raytrace.surface_points import SurfacePoints
@@ -204,6 +205,7 @@ class OpenBake(Protocol):
         key: identifies results of this bake in the cache.
         default_look: the complete look of the scene as it was imported.
         glass: the glass that its rays have met.
+        object_materials: materials of objects that a look has added to those of the scene.
         camera_mode, axes: capabilities of its pictures; callers do not check the method's name.
     """
 
@@ -227,6 +229,16 @@ class OpenBake(Protocol):
     def camera_mode(self) -> CameraMode: ...
     @property
     def axes(self) -> frozenset[EditAxis]: ...
+    @property
+    def object_materials(self) -> ObjectMaterials: ...
+    def with_object_materials(self, materials: ObjectMaterials) -> Self:
+        """Return the same bake with the object materials of a look, and no other ones.
+
+        Raises:
+            ParameterError, StoreError: see `relume.live.opened.object_material_store.ObjectMaterialStore`.
+        """
+        ...
+
     def environment_radiance(self, name: str | None) -> Shaped[F32, "height width 3"]:
         """Return the radiance map of an environment, None for the scene's own."""
         ...
@@ -406,6 +418,7 @@ class StaticViewFactory(Protocol):
         *,
         smooths_edges: bool = True,
         glass: GlassOfLook | None = None,
+        object_materials: ObjectMaterials = (),
     ) -> FixedViewTransfer:
         """Trace the view; see `relume.live.opened.static_view.StaticViewBuilder.make_static_view`."""
         ...

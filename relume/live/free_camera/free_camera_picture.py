@@ -53,6 +53,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import get_texel_tables
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
 from relume.look.glass import GlassOfLook, glass_of
+from relume.look.object_materials import object_materials_of
 from relume.math.zernike import degree_of
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
@@ -76,13 +77,23 @@ class FreeCameraPicture:
 
     def __init__(self, transfer: FreeCameraTransfer, view_name: str, *, is_watched: bool = False) -> None:
         view = transfer.views[view_name]
-        self._transfer, self._camera, self._size = transfer, view.camera, (view.width, view.height)
+        self._camera, self._size = view.camera, (view.width, view.height)
         self._camera_seq = 0  # increases with each camera
         self._look: Look | None = None
         self._light: Illumination | None = None
         self._solo: Solo = None
         self._is_watched = is_watched
         self._is_coarse = False  # the displayed light is approximate
+        self._is_stale = False  # the frame is outdated: its pixels were not requested
+        self._residual_image: F32 | None = None  # residual that is added to the frame
+        self._is_refined = False  # a job has refined the frame since the last step
+        self.renders_pixels = True
+        self._vectors_version = self._materials_version = 0
+        self._open(transfer)
+
+    def _open(self, transfer: FreeCameraTransfer) -> None:
+        """Show a bake; nothing of another one is shown further."""
+        self._transfer = transfer
         self._displayed: tuple[Any, ...] | None = None
         self._previous: PreviousImage | None = None
         self._dirty_cache: tuple[GBuffer, bytes, DirtyPixels] | None = None
@@ -91,16 +102,11 @@ class FreeCameraPicture:
         self._materials: tuple[tuple[Look, bool] | None, MaterialState | None] = None, None
         self._probe_light, self._all_probes = ProbeLightState(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
         self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of hard-shadow lights, for a camera
-        self._is_stale = False  # the frame is outdated: its pixels were not requested
         self._texel_light = TexelLight()
-        self._residual_image: F32 | None = None  # residual that is added to the frame
-        self._is_refined = False  # a job has refined the frame since the last step
-        self.renders_pixels = True
         # of the latest light that it is known for, with and without indirect light
         self._lobe_scenes: dict[bool, tuple[Illumination, LobeScene]] = {}
         self._narrow_look: tuple[Look | None, bool] = None, False  # whether the look has narrow terms
         self._published_vectors: IncidentCoefficients | None = None
-        self._vectors_version = self._materials_version = 0
 
     def check(self, look: Look) -> None:
         """Check that a look can be shown: tables represent any number of terms, but BTFs may be too large together.
@@ -123,11 +129,14 @@ class FreeCameraPicture:
         """
         if active_pointer is not None:
             parse_pointer(active_pointer)
-        names = self._transfer.material_names
-        images = emission_images(geometries(look), self._transfer.emission_image)
-        self._transfer.check_links(links(look))
+        transfer = self._transfer.with_object_materials(object_materials_of(look))
+        names = transfer.material_names
+        images = emission_images(geometries(look), transfer.emission_image)
+        transfer.check_links(links(look))
         light = illumination_from_look(look, names, has_bounces=True, solo=solo, images=images)
-        self._transfer.environment_map(light.environment.map)  # raises now if it is not available
+        transfer.environment_map(light.environment.map)  # raises now if it is not available
+        if transfer is not self._transfer:
+            self._open(transfer)
         self._look, self._light, self._solo = look, light, solo
         if (glass := glass_of(look)) != self._glass[0]:
             self._glass = glass, edited_rules(self._transfer.embree, names, self._transfer.glass, glass)
@@ -160,6 +169,11 @@ class FreeCameraPicture:
             picture._gbuffer = picture._camera_seq, self._gbuffer[1]
         picture._lobe_scenes = self._lobe_scenes
         return picture
+
+    @property
+    def has_object_materials(self) -> bool:
+        """True if the look adds materials of objects to those of the scene."""
+        return bool(self._transfer.object_materials)
 
     @property
     def is_corrected(self) -> bool:

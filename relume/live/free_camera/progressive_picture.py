@@ -33,6 +33,7 @@ from relume.live.free_camera.static_view_jobs import (
     static_view_job,
 )
 from relume.look import Look
+from relume.look.object_materials import object_materials_of
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
@@ -83,6 +84,8 @@ class ProgressivePicture:
             ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
         """
         static_picture = self._static_picture if self._has_indirect or not _has_indirect(look) else None
+        if static_picture is not None and static_picture.object_materials != object_materials_of(look):
+            static_picture = None
         if static_picture is not None:  # first, because it rejects every look that the other rejects
             static_picture.set_look(look, active_pointer=active_pointer, solo=solo)
         self._free_camera_picture.set_look(look, active_pointer=active_pointer, solo=solo)
@@ -119,9 +122,12 @@ class ProgressivePicture:
 
     def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants] | None:
         """Return what a shader needs to draw the free-camera image; None while it is corrected or the static view is
-        displayed.
+        displayed, and for object materials, whose surfaces and probes a browser lacks.
         """
-        is_server_rendered = self._displayed is self._static_picture or self._free_camera_picture.is_corrected
+        picture = self._free_camera_picture
+        is_server_rendered = (
+            self._displayed is self._static_picture or picture.is_corrected or picture.has_object_materials
+        )
         return None if is_server_rendered else self._free_camera_picture.array_blocks()
 
     def prepare(self, pointer: str) -> None:
@@ -158,6 +164,8 @@ class ProgressivePicture:
             self._is_idle = False
             return
         static_picture = result.picture
+        if static_picture.object_materials != object_materials_of(self._look):  # the next job traces them
+            return
         self._moving_error = result.error if request[1] == self._look_seq else None
         if _has_indirect(self._look) and not has_indirect:  # requested meanwhile; the next job reuses the traced view
             return

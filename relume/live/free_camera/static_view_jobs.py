@@ -31,6 +31,7 @@ from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.image_error import pixel_errors
 from relume.look import Look, TermLook
 from relume.look.glass import glass_of
+from relume.look.object_materials import object_materials_of
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
@@ -79,6 +80,7 @@ class StaticViewState:
             is_canceled,
             smooths_edges=smooths_edges,
             glass=glass_of(look),
+            object_materials=object_materials_of(look),
         )
         picture = Picture(transfer, next(iter(transfer.views)), self.cache, make_static_view=self.make_static_view)
         picture.set_look(look, solo=self.solo)

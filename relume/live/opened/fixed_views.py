@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
+from weakref import WeakValueDictionary
 
 import numpy as np
 from jaxtyping import Shaped
@@ -53,11 +54,13 @@ from relume.live.opened.lobe_light import (
     trace_lobes,
 )
 from relume.live.opened.local_lights import LocalLights
+from relume.live.opened.object_material_store import ObjectMaterialStore
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete, validate
 from relume.look.glass import GlassOfLook, glass_of
+from relume.look.object_materials import ObjectMaterials
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
@@ -92,6 +95,8 @@ class BakedFixedViews:
         key: path of the store; identifies this bake's entries in the cache.
         default_look: the complete look of the scene as it was imported.
         glass: the glass that rays have met: that of `default_look`, or edited glass.
+        object_materials: materials of objects that a look has added to those of the scene.
+        scene_bake: the bake without object materials; None for itself.
     """
 
     cache: Cache
@@ -104,6 +109,8 @@ class BakedFixedViews:
     glass: GlassOfLook
     material_names: Sequence[str]
     views: dict[str, View]
+    object_materials: ObjectMaterials = field(default=(), kw_only=True)
+    scene_bake: Self | None = field(default=None, repr=False, compare=False, kw_only=True)
 
     camera_mode = CameraMode.FIXED
     axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.LIGHT, EditAxis.ENVIRONMENT))
@@ -118,6 +125,28 @@ class BakedFixedViews:
             StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
         """
         return cls(**read_fields(store, key, cache))
+
+    def with_object_materials(self, materials: ObjectMaterials) -> Self:
+        """Return the same bake with object materials of a look. See `FixedViewTransfer`."""
+        if materials == self.object_materials:
+            return self
+        if self.scene_bake is not None:
+            return self.scene_bake.with_object_materials(materials)
+        if (bake := self._assigned.get(materials)) is None:
+            store = ObjectMaterialStore(self.store, self.local.embree, materials)
+            key = f"{self.key}/objects-{digest(materials)[:16]}"
+            self._assigned[materials] = bake = self._assign(store, key, materials)
+        return bake
+
+    @cached_property
+    def _assigned(self) -> WeakValueDictionary[ObjectMaterials, Self]:
+        """Open bakes with object materials, as long as an image uses them."""
+        return WeakValueDictionary()
+
+    def _assign(self, store: ObjectMaterialStore, key: str, materials: ObjectMaterials) -> Self:
+        fields = read_light_fields(store, key, self.cache)
+        fields["views"] = {name: open_view(store, view.index, self.cache, key) for name, view in self.views.items()}
+        return replace(self, **fields, object_materials=materials, scene_bake=self)
 
     @cached_property
     def derived(self) -> ImageFiles:

@@ -20,11 +20,13 @@ from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import LobePatches, broad_share
 from relume.live.opened.local_lights import LocalLights
+from relume.live.opened.object_material_store import ObjectMaterialStore
 from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.live.opened.planar_mirror_light import MirrorLightTransfer
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import SelectedSamples
 from relume.live.opened.stored_patches import read_patches
+from relume.look.object_materials import ObjectMaterials
 from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
@@ -57,6 +59,9 @@ class BakedIndirectViews(BakedFixedViews):
         """Open a store with patches. See `BakedFixedViews`."""
         fields = read_fields(store, key, cache)
         return cls(**fields, patches=read_patches(store), mirror_lights=read_mirror_lights(store))
+
+    def _assign(self, store: ObjectMaterialStore, key: str, materials: ObjectMaterials) -> Self:
+        return replace(super()._assign(store, key, materials), patches=read_patches(store))
 
     @cached_property
     def indirect(self) -> IndirectSolver:

@@ -34,6 +34,7 @@ from relume.live.opened.sun_extraction import SunExtractor
 from relume.look import EnvironmentKey, LightGeometry
 from relume.look.glass import GlassOfLook
 from relume.look.model import Link
+from relume.look.object_materials import ObjectMaterials
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
 from relume.methods.mirror_lights import read_mirror_lights
 from relume.methods.store_layout import BakedError, read_free_camera_error
@@ -103,6 +104,18 @@ class BakedFreeCamera:
             {camera.name: FreeView(camera, width, height, bounds) for camera in cameras},
             read_free_camera_error(store) if is_measured else None,
         )
+
+    @property
+    def object_materials(self) -> ObjectMaterials:
+        """Materials of objects that a look has added to those of the scene."""
+        return self.light_transport.object_materials
+
+    def with_object_materials(self, materials: ObjectMaterials) -> Self:
+        """Return the same bake with object materials of a look. See `OpenBake`."""
+        if materials == self.object_materials:
+            return self
+        light_transport = self.light_transport.with_object_materials(materials)
+        return replace(self, light_transport=light_transport, stored_scene=read_stored_scene(light_transport.store))
 
     @property
     def cache(self) -> Cache:

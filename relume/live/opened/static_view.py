@@ -32,6 +32,7 @@ from relume.live.opened.lobe_light import LobeTracer
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.samples import SelectedSamples
 from relume.look.glass import GlassOfLook, with_glass
+from relume.look.object_materials import ObjectMaterials, with_object_materials
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
 from relume.operators.image_cache import ImageFiles
@@ -210,6 +211,7 @@ class StaticViewBuilder:
         *,
         smooths_edges: bool = True,
         glass: GlassOfLook | None = None,
+        object_materials: ObjectMaterials = (),
     ) -> BakedFixedViews:
         """Trace a static view, as far as it is not cached.
 
@@ -217,12 +219,13 @@ class StaticViewBuilder:
             camera: the pose. size: width and height, pixels. reflects: includes indirect illumination.
             progress: called with the completed fraction. is_canceled: polled.
             smooths_edges: whether pixels on edges have several samples; else each has one at its center.
-            glass: that rays meet; None: the scene's own.
+            glass: that rays meet; None: the scene's own. object_materials: of the look.
         Raises:
             CancelledError: `is_canceled` returned True.
             MemoryBudgetError: the view exceeds the memory budget.
         """
-        light_transport, scene = self._light_transport, self._scene
+        light_transport = self._light_transport.with_object_materials(object_materials)
+        scene = with_object_materials(self._scene, object_materials)
         method = self._smooth if smooths_edges else self._sparse
         glass = light_transport.glass if glass is None else glass
         if glass != light_transport.glass:

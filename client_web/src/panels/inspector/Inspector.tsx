@@ -28,6 +28,7 @@ import { RadioRow, type RadioOption } from "../../ui/RadioRow";
 import { Section } from "../../ui/Section";
 import { AlbedoInfo } from "./AlbedoInfo";
 import { GlassControls } from "./glass/GlassControls";
+import { ObjectMaterials } from "./ObjectMaterials";
 import { PrincipledView } from "./principled/PrincipledView";
 import { TermCard } from "./TermCard";
 import { BasisFunctions } from "./ZernikeFit";
@@ -204,9 +205,10 @@ function MaterialInspector() {
             materialLook={materialLook}
             mirrors={materialOf(material)?.terms.some(isMirror) === true}
           />
-          <EmissionImage material={material} />
+          {materialLook.base == null && <EmissionImage material={material} />}
         </Section>
       )}
+      {materialLook !== undefined && <ObjectMaterials name={material} material={materialLook} />}
     </div>
   );
 }

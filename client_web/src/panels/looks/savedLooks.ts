@@ -27,7 +27,7 @@ function fitsScene(look: Partial<Look>): boolean {
   const hasMesh = (name: string, light: Light) =>
     lightNames.has(name) || (light.kind === "mesh" && light.image != null && materialNames.has(light.material));
   return (
-    Object.keys(look.materials ?? {}).every((name) => materialNames.has(name)) &&
+    Object.entries(look.materials ?? {}).every(([name, { base }]) => materialNames.has(base ?? name)) &&
     Object.entries(look.lights ?? {}).every(([name, light]) => light.kind !== "mesh" || hasMesh(name, light))
   );
 }

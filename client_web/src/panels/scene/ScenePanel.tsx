@@ -7,7 +7,7 @@ import { measuredThumbnailUrl } from "../../session/net/api";
 import type { MaterialLook } from "../../protocol";
 import { soloMaterial, toggleMaterialSolo } from "../../state/visibility/soloSources";
 import { defaultLook, look } from "../../state/look";
-import { materialNames, modelOf } from "../../state/scene";
+import { shownMaterialNames, modelOf } from "../../state/scene";
 import { mayEdit } from "../../state/sessionUser";
 import {
   hoveredMaterial,
@@ -97,9 +97,9 @@ function MaterialList() {
     const next = items[Math.min(items.length - 1, Math.max(0, index))];
     next?.focus();
     const name = next?.dataset["material"];
-    if (event.shiftKey && name !== undefined) selectMaterialsTo(name, materialNames.value);
+    if (event.shiftKey && name !== undefined) selectMaterialsTo(name, shownMaterialNames.value);
   };
-  const focusable = selectedMaterial.value ?? materialNames.value[0];
+  const focusable = selectedMaterial.value ?? shownMaterialNames.value[0];
   return (
     <div
       class="materials"
@@ -110,7 +110,7 @@ function MaterialList() {
       onKeyDown={move}
       onPointerLeave={() => (hoveredMaterial.value = null)}
     >
-      {materialNames.value.map((name) => {
+      {shownMaterialNames.value.map((name) => {
         const material = look.value?.materials[name];
         const changed = look.value !== null && !isDeepEqual(material, defaultLook.value?.materials[name]);
         return (
@@ -126,7 +126,7 @@ function MaterialList() {
             onBlur={() => (hoveredMaterial.value = null)}
             onClick={(event) => {
               if (event.ctrlKey || event.metaKey) toggleMaterial(name);
-              else if (event.shiftKey) selectMaterialsTo(name, materialNames.value);
+              else if (event.shiftKey) selectMaterialsTo(name, shownMaterialNames.value);
               else selectMaterial(name);
             }}
           >
@@ -160,7 +160,7 @@ export function ScenePanel() {
   useEffect(watchBalls, []);
   return (
     <nav class="panel outline" aria-label="Scene">
-      <Section title="Materials" count={materialNames.value.length} actions={<SoloButton />}>
+      <Section title="Materials" count={shownMaterialNames.value.length} actions={<SoloButton />}>
         <MaterialList />
         <CopyPaste />
       </Section>
