@@ -12,7 +12,7 @@ from relume.brdf.roughness_levels import NO_LEVELS
 from relume.brdf.term_validation import complete_term
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.camera_rays import trace_rays
-from relume.raytrace.lobe_directions import lobe_shift, make_lobe_pattern
+from relume.raytrace.lobe_directions import lobe_shift, lobe_vector, make_lobe_pattern
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.surface_textures import TextureCoordinates, Textures, concatenate_textures
@@ -63,8 +63,8 @@ def points():
 def directions(pattern, points, wo):
     rays = [
         lobe_ray_in_pixel(
-            pattern, 0, ray, lobe_shift(pattern, points.seed[p]), points.normal[p], points.tangent[p], wo[p],
-            NO_FOOTPRINT[0], points.seed[p],
+            pattern, lobe_vector(pattern, 0, ray, lobe_shift(pattern, points.seed[p]))[0], ray, points.normal[p],
+            points.tangent[p], wo[p], NO_FOOTPRINT[0], points.seed[p],
         )[0]
         for p in range(NUM)
         for ray in range(pattern.num_rays)
