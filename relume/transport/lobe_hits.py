@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_cancellable
-from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE
 from relume.raytrace.lobe_directions import (
     LobePattern,
     angle_at_quantile,
@@ -199,14 +199,17 @@ def _store_hits(packet, lanes, ray, first, width, surfaces, hits):  # type: igno
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, hits, paths, end):  # type: ignore[no-untyped-def]
+def _trace_packet(
+    packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, is_lit, hits, paths, end
+):  # type: ignore[no-untyped-def]  # fmt: skip
     """Trace all rays of points [first, first + width), the same ray of all at once.
 
     Every fourth ray comes first. If all of these, of all points, escape, all others are taken to escape too: an
-    occluder between them covers a small part of the lobes.
+    occluder between them covers a small part of the lobes. If none escapes, and it does not matter what they meet, all
+    others are taken not to escape.
 
     Args:
-        packet, lanes: memory. aim: shift and level of each lane.
+        packet, lanes: memory. aim: shift and level of each lane. is_lit: from `_is_lit`.
         points, wo, footprint, lookup, surfaces, pattern, hits, paths: as in `_trace`. end: number of paths so far.
     Returns:
         New number of paths.
@@ -215,26 +218,36 @@ def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, p
     has_glass = surfaces.glass.shape[0] > 0
     follows = surfaces.quantile.shape[0] > 0 or has_glass
     _load_points(points, first, width, packet)
-    num_blocked = 0
+    num_probes, num_escaping = width * ((num_rays + _PROBING - 1) // _PROBING), 0
     for begin in range(_PROBING):
-        if begin == 1 and num_blocked == 0 and num_rays >= _FEW_PROBES:
-            hits[1][first : first + width] = 255
-            break
+        if begin == 1 and num_rays >= _FEW_PROBES:
+            if num_escaping == num_probes:
+                hits[1][first : first + width] = 255
+            if num_escaping == num_probes or (num_escaping == 0 and not is_lit):
+                break
         for ray in range(begin, num_rays, _PROBING):
-            num_blocked += width
             if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
                 continue
             trace_hits(packet)
             for k in range(LANES):
                 lanes.distance[k] = 0
             look_up_hits(packet, ray, lookup, surfaces, lanes)
-            num_blocked -= _store_hits(packet, lanes, ray, first, width, surfaces, hits)
+            num_escaping += _store_hits(packet, lanes, ray, first, width, surfaces, hits)
             if follows:
                 before = end
                 end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
                 if end > before:
                     _load_points(points, first, width, packet)
     return end
+
+
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def _is_lit(lookup, surfaces):  # type: ignore[no-untyped-def]
+    """True if rays that meet a surface may bring light: of a patch, of a lobe or through glass."""
+    is_lit = surfaces.quantile.shape[0] > 0 or surfaces.glass.shape[0] > 0
+    for k in range(lookup.tree.roots.shape[0]):
+        is_lit |= lookup.tree.roots[k] != NO_PATCH_NODE
+    return is_lit
 
 
 @nb.njit(nogil=True, cache=True)
@@ -251,6 +264,7 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
     """
     packet, lanes, end = new_packet(tracer), allocate_lanes(), np.int64(0)
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
+    is_lit = _is_lit(lookup, surfaces)
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for k in range(LANES):
@@ -259,8 +273,8 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
             shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
             lanes.spread[k] = _ray_spacing(pattern, levels[k], half_vector_spread(footprint, p))
         end = _trace_packet(
-            packet, lanes, (shifts, levels), points, wo, footprint, lookup, surfaces, pattern, first, width, hits,
-            paths, end,
+            packet, lanes, (shifts, levels), points, wo, footprint, lookup, surfaces, pattern, first, width, is_lit,
+            hits, paths, end,
         )  # fmt: skip
     return end
 
