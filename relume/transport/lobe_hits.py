@@ -199,9 +199,7 @@ def _store_hits(packet, lanes, ray, first, width, surfaces, hits):  # type: igno
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _trace_packet(
-    packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, is_lit, hits, paths, end
-):  # type: ignore[no-untyped-def]  # fmt: skip
+def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, hits, paths, end):  # type: ignore[no-untyped-def]
     """Trace all rays of points [first, first + width), the same ray of all at once.
 
     Every fourth ray comes first. If all of these, of all points, escape, all others are taken to escape too: an
@@ -209,12 +207,12 @@ def _trace_packet(
     others are taken not to escape.
 
     Args:
-        packet, lanes: memory. aim: shift and level of each lane. is_lit: from `_is_lit`.
+        packet, lanes: memory. aim: shift and level of each lane, and `_is_lit`.
         points, wo, footprint, lookup, surfaces, pattern, hits, paths: as in `_trace`. end: number of paths so far.
     Returns:
         New number of paths.
     """
-    (shifts, levels), num_rays = aim, hits[0].shape[1]
+    (shifts, levels, is_lit), num_rays = aim, hits[0].shape[1]
     has_glass = surfaces.glass.shape[0] > 0
     follows = surfaces.quantile.shape[0] > 0 or has_glass
     _load_points(points, first, width, packet)
@@ -273,7 +271,7 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
             shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
             lanes.spread[k] = _ray_spacing(pattern, levels[k], half_vector_spread(footprint, p))
         end = _trace_packet(
-            packet, lanes, (shifts, levels), points, wo, footprint, lookup, surfaces, pattern, first, width, is_lit,
+            packet, lanes, (shifts, levels, is_lit), points, wo, footprint, lookup, surfaces, pattern, first, width,
             hits, paths, end,
         )  # fmt: skip
     return end
