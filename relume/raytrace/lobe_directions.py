@@ -38,8 +38,9 @@ class LobePattern(NamedTuple):
         uv: points on the unit square.
         sides: two edge vectors of a lattice cell.
         seed: seed of the shifts.
-        angles, axes, quantile, band_density, is_half_angle, is_narrow: as in `LobeSampling`; points of other levels
-            have no rays.
+        angles, axes, quantile, is_half_angle, is_narrow: as in `LobeSampling`; points of other levels have no rays.
+        band_density: as in `LobeSampling`; of two angles, the two factors of the density per steradian.
+        squared_sine: of each band, of the factor (1 − sin² γ₀ sin² γ₁)^1.5 between two tilts; zero for other angles.
         scale: bands per radian.
     """
 
@@ -50,6 +51,7 @@ class LobePattern(NamedTuple):
     axes: Shaped[F32, " 3"]
     quantile: Shaped[F32, "rows quantiles"]
     band_density: Shaped[F32, "rows J"]
+    squared_sine: Shaped[F32, " J"]
     is_half_angle: bool
     is_narrow: Shaped[NDArray[np.bool_], " L"]
     scale: float
@@ -73,11 +75,28 @@ def make_lobe_pattern(sampling: LobeSampling, num_rays: int, seed: int) -> LobeP
         np.array(sampling.angles, np.int64),
         np.array(sampling.axes, np.float32),
         sampling.quantile,
-        sampling.band_density,
+        *_density_factors(sampling),
         sampling.is_half_angle,
         sampling.is_narrow,
         np.float32(sampling.band_density.shape[1] / (np.pi / 2)),  # type: ignore[arg-type]  # a kernel's float32
     )
+
+
+def _density_factors(sampling: LobeSampling) -> tuple[Shaped[F32, "rows J"], Shaped[F32, " J"]]:
+    """Return `band_density` and `squared_sine` of a pattern.
+
+    Of two angles, dωh / (dγ₀ dγ₁) is cos³ θh / (cos² γ₀ cos² γ₁) for tilts, else sin γ₀ sin γ₁ / (l₀ l₁) with
+    l = √(−2 ln cos γ). Both are products, the first times (1 − sin² γ₀ sin² γ₁)^−1.5.
+    """
+    num_bands = sampling.band_density.shape[1]
+    angle = (np.arange(num_bands) + 0.5) * (np.pi / 2 / num_bands)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    if len(sampling.angles) == 1:
+        return sampling.band_density, np.zeros(num_bands, np.float32)
+    if sampling.angles[0] == TILT_X:
+        return np.asarray(sampling.band_density / cosine, np.float32), np.square(sine).astype(np.float32)
+    extent = sine / np.sqrt(-2 * np.log(cosine))
+    return np.asarray(sampling.band_density / extent, np.float32), np.zeros(num_bands, np.float32)
 
 
 # The following functions are inlined: calls would count references to the pattern's arrays, which threads share.
@@ -93,28 +112,37 @@ def lobe_shift(pattern, seed):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def lobe_ray(pattern, level, ray, shift, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Direction of a ray in the point's local frame, x = tangent, y = n × t, z = n.
+def lobe_vector(pattern, level, ray, shift):  # type: ignore[no-untyped-def]
+    """Direction of a ray within its lobe, whatever the view direction: its half vector, or wi for wo on the normal.
 
     Args:
-        pattern: a `LobePattern`. level: roughness level of the point. ray: index of the ray.
-        shift: from `lobe_shift`. ox, oy, oz: local wo, toward the viewer.
+        pattern: a `LobePattern`. level: roughness level of the point. ray: index of the ray. shift: from `lobe_shift`.
     Returns:
-        Local wi, not above the horizon for rays that must not be traced; band of the ray's angle, or of two angles
-        as j₀ J + j₁, negative for such rays.
+        The vector, a tuple; band of the ray's angle, or of two angles as j₀ J + j₁.
     """
     u, v = _wrapped(pattern.uv[ray, 0] + shift[0]), _wrapped(pattern.uv[ray, 1] + shift[1])
     if pattern.angles.shape[0] == 1:
         angle, band = _angle_in_band(pattern, level, u)
-        px, py, pz = mirrored_axis(pattern, ox, oy, oz)
-        wi, is_valid = lobe_direction(pattern.is_half_angle, angle, v, px, py, pz)
-    else:
-        along, first_band = _angle_in_band(pattern, 2 * level, abs(_TWO * u - _ONE))
-        across, second_band = _angle_in_band(pattern, 2 * level + 1, abs(_TWO * v - _ONE))
-        hx, hy, hz = _half_vector(pattern.angles[0], along, across)
-        wi, is_valid = _reflected(hx if u >= _HALF else -hx, hy if v >= _HALF else -hy, hz, ox, oy, oz)
-        band = first_band * pattern.band_density.shape[1] + second_band
-    return wi, band if is_valid else -1
+        return _polar(angle, v), band
+    along, first_band = _angle_in_band(pattern, 2 * level, abs(_TWO * u - _ONE))
+    across, second_band = _angle_in_band(pattern, 2 * level + 1, abs(_TWO * v - _ONE))
+    hx, hy, hz = _half_vector(pattern.angles[0], along, across)
+    vector = hx if u >= _HALF else -hx, hy if v >= _HALF else -hy, hz
+    return vector, first_band * pattern.band_density.shape[1] + second_band
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_ray(pattern, vector, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Direction of a ray in the point's local frame, x = tangent, y = n × t, z = n.
+
+    Args:
+        pattern: a `LobePattern`. vector: from `lobe_vector`. ox, oy, oz: local wo, toward the viewer.
+    Returns:
+        Local wi, a tuple; False for rays that must not be traced, as they belong to no half vector that the viewer
+        sees. They are not traced below the horizon either.
+    """
+    px, py, pz = mirrored_axis(pattern, ox, oy, oz) if pattern.angles.shape[0] == 1 else (ox, oy, oz)
+    return _about_viewer(pattern.is_half_angle, vector, px, py, pz)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -164,18 +192,6 @@ def _log_cosine(sine):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def _solid_angle_of(angle, along, across):  # type: ignore[no-untyped-def]
-    """Solid angle dωh / (dγ₀ dγ₁) of half vectors. angle, along, across: as for `_half_vector`, not zero"""
-    a, b = np.float32(math.sin(along)), np.float32(math.sin(across))
-    if angle == TILT_X:
-        # cos³ θh / (cos² γ₀ cos² γ₁)
-        p, q = np.float32(math.cos(along)), np.float32(math.cos(across))
-        p, q = p * p, q * q
-        return np.float32(math.sqrt(p * q)) / np.float32(math.sqrt(_ONE - a * a * b * b)) ** 3
-    return a * b / (_log_cosine(a) * _log_cosine(b))
-
-
-@nb.njit(nogil=True, cache=True, inline="always")
 def angle_at_quantile(quantile, row, u):  # type: ignore[no-untyped-def]
     """Angle at the fraction u of a cumulative distribution, `LobeSampling.quantile` [row], radians."""
     num_cells = quantile.shape[1] - 1
@@ -193,18 +209,16 @@ def _reflected(x, y, z, ox, oy, oz):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
-def lobe_direction(is_half_angle, angle, v, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Local wi at an angle of a lobe.
+def _polar(angle, v):  # type: ignore[no-untyped-def]
+    """Unit vector at an angle to z, radians, and an azimuth, as a fraction of a turn."""
+    azimuth, sine = _TWO * _PI * v, np.float32(math.sin(angle))
+    return sine * np.float32(math.cos(azimuth)), sine * np.float32(math.sin(azimuth)), np.float32(math.cos(angle))
 
-    Args:
-        is_half_angle: whether the angle is θh, else θr. angle: radians. v: azimuth as a fraction of a turn.
-        ox, oy, oz: local wo.
-    Returns:
-        wi, a tuple; False if it belongs to no half vector that the viewer sees.
-    """
-    azimuth = _TWO * _PI * v
-    sine, z = np.float32(math.sin(angle)), np.float32(math.cos(angle))
-    x, y = sine * np.float32(math.cos(azimuth)), sine * np.float32(math.sin(azimuth))
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def _about_viewer(is_half_angle, vector, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Local wi of a half vector, or of a vector about the mirror direction. See `lobe_direction`."""
+    x, y, z = vector
     if is_half_angle:
         return _reflected(x, y, z, ox, oy, oz)
     # about the mirror direction (−ox, −oy, oz): the frame that rotates n to it along the shortest arc
@@ -215,6 +229,19 @@ def lobe_direction(is_half_angle, angle, v, ox, oy, oz):  # type: ignore[no-unty
         y - oy * along * inverse - oy * z,
         along + oz * z,
     ), True
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def lobe_direction(is_half_angle, angle, v, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """Local wi at an angle of a lobe.
+
+    Args:
+        is_half_angle: whether the angle is θh, else θr. angle: radians. v: azimuth as a fraction of a turn.
+        ox, oy, oz: local wo.
+    Returns:
+        wi, a tuple; False if it belongs to no half vector that the viewer sees.
+    """
+    return _about_viewer(is_half_angle, _polar(angle, v), ox, oy, oz)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
@@ -238,7 +265,7 @@ def lobe_density(pattern, level, band, cos_theta_d):  # type: ignore[no-untyped-
         density = num_rays * pattern.band_density[level, band]
     else:
         first, second = band // num_bands, band % num_bands
-        along, across = (np.float32(first) + _HALF) / pattern.scale, (np.float32(second) + _HALF) / pattern.scale
-        product = pattern.band_density[2 * level, first] * pattern.band_density[2 * level + 1, second]
-        density = num_rays * product / _solid_angle_of(pattern.angles[0], along, across)
+        density = num_rays * pattern.band_density[2 * level, first] * pattern.band_density[2 * level + 1, second]
+        sines = _ONE - pattern.squared_sine[first] * pattern.squared_sine[second]
+        density *= sines * np.float32(math.sqrt(sines))
     return density / (_FOUR * max(cos_theta_d, _MIN_COSINE)) if pattern.is_half_angle else density

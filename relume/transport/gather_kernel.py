@@ -30,21 +30,21 @@ class GatherScratch(NamedTuple):
     """Scratch memory of a point's rays.
 
     Attributes:
-        rows, rays: lobes that are hit, and the rays that hit them; one more. local: directions, and for
-            `_generate_rays`. weights: of the rays. entry: of each ray in `ListedRays`.
+        hits: rays that hit a patch; one more. rows, entries: lobes that are hit, and the hits among these rays; one
+            more. local: directions, and for `_generate_rays`. weights: of the rays.
     """
 
+    hits: Shaped[NDArray[np.int64], " rays_and_one"]
     rows: Shaped[NDArray[np.int32], " rays_and_one"]
-    rays: Shaped[NDArray[np.int64], " rays_and_one"]
+    entries: Shaped[NDArray[np.int64], " rays_and_one"]
     local: Shaped[F32, "5 rays"]
     weights: Shaped[F32, " rays"]
-    entry: Shaped[NDArray[np.int64], " rays"]
 
 
 def allocate_scratch(num_rays: int) -> GatherScratch:
     """Allocate scratch memory for a number of rays per point."""
-    rows, rays, entry = np.empty(num_rays + 1, np.int32), np.empty(num_rays + 1, np.int64), np.empty(num_rays, np.int64)
-    return GatherScratch(rows, rays, np.empty((5, num_rays), np.float32), np.empty(num_rays, np.float32), entry)
+    (hits, entries), rows = np.empty((2, num_rays + 1), np.int64), np.empty(num_rays + 1, np.int32)
+    return GatherScratch(hits, rows, entries, np.empty((5, num_rays), np.float32), np.empty(num_rays, np.float32))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -127,16 +127,30 @@ def _generate_rays(pattern, seed, o, local, weight):  # type: ignore[no-untyped-
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
-    """List the rays of a point that hit a patch with a lobe; return their number. Avoids unpredictable branches.
+def _patches_hit(gather_hits, hits):  # type: ignore[no-untyped-def]
+    """List the rays of a point that hit a patch; return their number. Avoids unpredictable branches.
 
     Args:
-        gather_hits: gather hits of the point. (rays,) lobe: lobe of each patch.
-        rows, rays: lobes and rays, written. (> rays,)
+        gather_hits: patch of each ray of the point. (rays,) hits: rays, written. (> rays,)
     """
     num = 0
     for ray in range(gather_hits.shape[0]):
-        rows[num], rays[num] = lobe[gather_hits[ray]], ray
+        hits[num] = ray
+        num += gather_hits[ray] != NO_PATCH
+    return num
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def _lobes_hit(gather_hits, hits, lobe, rows, entries):  # type: ignore[no-untyped-def]
+    """List the hits at patches with a lobe; return their number. Avoids unpredictable branches.
+
+    Args:
+        gather_hits: as in `_patches_hit`. hits: from it. (hits,) lobe: lobe of each patch.
+        rows, entries: lobes, and indices in `hits`, written. (> hits,)
+    """
+    num = 0
+    for k in range(hits.shape[0]):
+        rows[num], entries[num] = lobe[gather_hits[hits[k]]], k
         num += rows[num] >= 0
     return num
 
@@ -167,60 +181,68 @@ def list_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, sc
         K, the number of rays.
     """
     (_, normal, tangent, seed, _), (first, wi, out, irradiance) = points, listed
-    rows, rays, local, weights, entry_index = scratch
-    has_lobes, num_rays, end = outgoing.table.shape[0] > 0, gather_hits.shape[1], 0
+    hits, rows, entries, local, weights = scratch
+    has_lobes, isotropic, end = outgoing.table.shape[0] > 0, outgoing.isotropic, 0
     for p in range(start, stop):
-        first[p - start] = end
+        first[p - start] = begin = end
         n, t = normal[p], tangent[p]
         b, o = in_frame(n, t, wo[p])
         _generate_rays(pattern, seed[p], o, local, weights)
-        for ray in range(num_rays):
-            patch = gather_hits[p, ray]
-            entry_index[ray] = end
-            if patch == NO_PATCH:
-                continue
-            wi[0, end], wi[1, end], wi[2, end] = local[0, ray], local[1, ray], local[2, ray]
-            out[0, end], out[1, end], out[2, end] = o[0], o[1], o[2]
-            for channel in range(3):
-                irradiance[channel, end] = weights[ray] * outgoing.isotropic[patch, channel]
-            end += 1
-        for k in range(_lobes_hit(gather_hits[p], outgoing.lobe, rows, rays) if has_lobes else 0):
-            row, ray = rows[k], rays[k]
+        num = _patches_hit(gather_hits[p], hits)
+        end += num
+        for axis in range(3):
+            out[axis, begin:end] = o[axis]
+            for k in range(num):
+                wi[axis, begin + k] = local[axis, hits[k]]
+        for k in range(num):
+            patch, weight = gather_hits[p, hits[k]], weights[hits[k]]
+            irradiance[0, begin + k] = weight * isotropic[patch, 0]
+            irradiance[1, begin + k] = weight * isotropic[patch, 1]
+            irradiance[2, begin + k] = weight * isotropic[patch, 2]
+        for k in range(_lobes_hit(gather_hits[p], hits[:num], outgoing.lobe, rows, entries) if has_lobes else 0):
+            row, ray = rows[k], hits[entries[k]]
             bin_index = _bin_hit(outgoing, row, n, t, b, local[0, ray], local[1, ray], local[2, ray])
             table = _table_for(outgoing, pattern.num_cosine, weights[ray])
             for channel in range(3):
                 value = outgoing.scale[row, channel] * table[row, bin_index, channel]
-                irradiance[channel, entry_index[ray]] += weights[ray] * value
+                irradiance[channel, begin + entries[k]] += weights[ray] * value
     first[stop - start] = end
     return end
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
-def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
-    """Sum the light of the rays of points [start, stop), if directions do not matter.
+def sum_gather_rays(points, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Sum the light of the cosine rays of points [start, stop): irradiance, for which glossy rays are not needed.
 
     Args:
-        points, wo, gather_hits, pattern, outgoing, start, stop, scratch: as in `list_gather_rays`.
-        out: Σ w · L, written. (points, 3) float32
+        points, gather_hits, pattern, outgoing, start, stop, scratch: as in `list_gather_rays`.
+        out: π / n Σ L, written. (points, 3) float32
     """
     _, normal, tangent, seed, _ = points
-    rows, rays, local, weights, _ = scratch
-    has_lobes, num_rays = outgoing.table.shape[0] > 0, gather_hits.shape[1]
+    hits, rows, entries, local, _ = scratch
+    num, has_lobes = pattern.num_cosine, outgoing.table.shape[0] > 0
+    weight = _PI / np.float32(num)
     for p in range(start, stop):
-        n, t = normal[p], tangent[p]
-        b, o = in_frame(n, t, wo[p])
-        _generate_rays(pattern, seed[p], o, local, weights)
         red = green = blue = np.float32(0)
-        for ray in range(num_rays):
-            patch, weight = gather_hits[p, ray], weights[ray]
-            red += weight * outgoing.isotropic[patch, 0]
-            green += weight * outgoing.isotropic[patch, 1]
-            blue += weight * outgoing.isotropic[patch, 2]
-        for k in range(_lobes_hit(gather_hits[p], outgoing.lobe, rows, rays) if has_lobes else 0):
-            row, ray = rows[k], rays[k]
-            bin_index = _bin_hit(outgoing, row, n, t, b, local[0, ray], local[1, ray], local[2, ray])
-            weight, table = weights[ray], _table_for(outgoing, pattern.num_cosine, weights[ray])
-            red += weight * outgoing.scale[row, 0] * table[row, bin_index, 0]
-            green += weight * outgoing.scale[row, 1] * table[row, bin_index, 1]
-            blue += weight * outgoing.scale[row, 2] * table[row, bin_index, 2]
-        out[p - start, 0], out[p - start, 1], out[p - start, 2] = red, green, blue
+        for ray in range(num):
+            patch = gather_hits[p, ray]
+            red += outgoing.isotropic[patch, 0]
+            green += outgoing.isotropic[patch, 1]
+            blue += outgoing.isotropic[patch, 2]
+        num_lobes = 0
+        if has_lobes:
+            num_hits = _patches_hit(gather_hits[p, :num], hits)
+            num_lobes = _lobes_hit(gather_hits[p], hits[:num_hits], outgoing.lobe, rows, entries)
+        if num_lobes > 0:
+            n, t = normal[p], tangent[p]
+            b, _ = in_frame(n, t, n)
+            cosine_shift, _ = lattice_offsets(pattern, seed[p])
+            x, y, z = local[0, :num], local[1, :num], local[2, :num]
+            _cosine_rays(pattern.rays[:num], cosine_shift, x, y, z, local[3])
+            for k in range(num_lobes):
+                row, ray = rows[k], hits[entries[k]]
+                bin_index = _bin_hit(outgoing, row, n, t, b, x[ray], y[ray], z[ray])
+                red += outgoing.scale[row, 0] * outgoing.table[row, bin_index, 0]
+                green += outgoing.scale[row, 1] * outgoing.table[row, bin_index, 1]
+                blue += outgoing.scale[row, 2] * outgoing.table[row, bin_index, 2]
+        out[p - start, 0], out[p - start, 1], out[p - start, 2] = weight * red, weight * green, weight * blue

@@ -24,7 +24,7 @@ F32 = NDArray[np.float32]
 Bits = NDArray[np.uint8]
 
 _TRIANGLES_PER_BLOCK = 4096  # of area lights, at least those of one point
-POINTS_PER_BLOCK = 48  # directions of a block stay in a core's second-level cache
+POINTS_PER_BLOCK = 64  # bits of a word; directions of a block stay in a core's second-level cache
 
 _HALF_PI = np.float32(np.pi / 2)
 

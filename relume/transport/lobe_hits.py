@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_cancellable
-from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE
 from relume.raytrace.lobe_directions import (
     LobePattern,
     angle_at_quantile,
     lobe_ray,
     lobe_shift,
+    lobe_vector,
     ray_jitter,
 )
 from relume.raytrace.ray_packet import (
@@ -40,6 +41,7 @@ from relume.transport.patch_lookup import PatchLookup, allocate_lanes
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 256
+_PROBING, _FEW_PROBES = 4, 32  # every fourth ray is traced first, if there are enough
 _FEW_RAYS = 8  # of a point: with fewer, ranges are longer, and their memory is allocated less often
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _ROOT_TWO_PI = np.float32(math.sqrt(2 * math.pi))
@@ -54,7 +56,7 @@ class LobeHits:
 
     Attributes:
         patch: index of the patch that each ray hits, `NO_PATCH` for none.
-        escapes: ray k of a point in bit k & 7 of byte k >> 3, set if it leaves the scene.
+        escapes: ray k of a point in bit k & 7 of byte k >> 3, set if it leaves the scene; bits of no ray are undefined.
         texture: that each ray meets, packed, for each slot of `relume.transport.hit_textures.HitTextures`.
         paths: the rays that go on from narrow lobes or through glass; for the latter `patch` is `NO_PATCH`.
     """
@@ -107,20 +109,20 @@ def jittered_frame(normal, tangent, wo, footprint, u, v):  # type: ignore[no-unt
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def lobe_ray_in_pixel(pattern, level, ray, shift, normal, tangent, wo, footprint, seed):  # type: ignore[no-untyped-def]
+def lobe_ray_in_pixel(pattern, vector, ray, normal, tangent, wo, footprint, seed):  # type: ignore[no-untyped-def]
     """World-space direction of a ray from somewhere within its point's part of a pixel.
 
     Args:
-        pattern, level, ray, shift: as in `lobe_ray`. normal, tangent, wo: of the point. footprint: of the point.
+        pattern, vector: as in `lobe_ray`. ray: its index. normal, tangent, wo: of the point. footprint: of the point.
         seed: of the point.
     Returns:
         The direction, a tuple; True if the ray is above the horizon and must be traced.
     """
     u, v = ray_jitter(ray, np.uint32(seed) ^ _PIXEL_SEED)
     (t, b, n), local = jittered_frame(normal, tangent, wo, footprint, u - _HALF, v - _HALF)
-    (x, y, z), band = lobe_ray(pattern, level, ray, shift, local[0], local[1], max(local[2], _MIN_COSINE))
+    (x, y, z), is_valid = lobe_ray(pattern, vector, local[0], local[1], max(local[2], _MIN_COSINE))
     d = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
-    return d, z > 0 and band >= 0 and d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2] > 0
+    return d, z > 0 and is_valid and d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2] > 0
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
@@ -166,8 +168,9 @@ def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_
     num_valid = 0
     for k in range(LANES):
         p = first + min(k, width - 1)
+        vector, _ = lobe_vector(pattern, levels[k], ray, (shifts[0, k], shifts[1, k]))
         (dx, dy, dz), is_above = lobe_ray_in_pixel(
-            pattern, levels[k], ray, (shifts[0, k], shifts[1, k]), points.normal[p], points.tangent[p], wo[p],
+            pattern, vector, ray, points.normal[p], points.tangent[p], wo[p],
             footprint[min(p, footprint.shape[0] - 1)], points.seed[p],
         )  # fmt: skip
         set_direction(packet, k, dx, dy, dz, np.float32(np.inf))
@@ -180,40 +183,69 @@ def _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
+def _store_hits(packet, lanes, ray, first, width, surfaces, hits):  # type: ignore[no-untyped-def]
+    """Store what a ray of points [first, first + width) meets; return how many of them escape. See `_trace_packet`."""
+    (patch, escapes, texture), num_escaping = hits, 0
+    for k in range(width):
+        face = get_hit(packet, k)[0]
+        is_escaping = packet.is_active[k] != 0 and face < 0
+        num_escaping += is_escaping
+        escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
+        for row in range(texture.shape[0]):
+            texture[row, first + k, ray] = lanes.texture[row, k]
+        passes_glass = packet.is_active[k] != 0 and face >= 0 and is_glass(surfaces, face)
+        patch[first + k, ray] = NO_PATCH if passes_glass else lanes.patches[k]
+    return num_escaping
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, hits, paths, end):  # type: ignore[no-untyped-def]
     """Trace all rays of points [first, first + width), the same ray of all at once.
 
+    Every fourth ray comes first. If all of these, of all points, escape, all others are taken to escape too: an
+    occluder between them covers a small part of the lobes. If none escapes, and it does not matter what they meet, all
+    others are taken not to escape.
+
     Args:
-        packet, lanes: memory. aim: shift and level of each lane.
+        packet, lanes: memory. aim: shift and level of each lane, and `_is_lit`.
         points, wo, footprint, lookup, surfaces, pattern, hits, paths: as in `_trace`. end: number of paths so far.
     Returns:
         New number of paths.
     """
-    (patch, escapes, texture), (shifts, levels) = hits, aim
-    has_glass, num_rays = surfaces.glass.shape[0] > 0, patch.shape[1]
+    (shifts, levels, is_lit), num_rays = aim, hits[0].shape[1]
+    has_glass = surfaces.glass.shape[0] > 0
     follows = surfaces.quantile.shape[0] > 0 or has_glass
     _load_points(points, first, width, packet)
-    for ray in range(num_rays):
-        if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
-            continue
-        trace_hits(packet)
-        for k in range(LANES):
-            lanes.distance[k] = 0
-        look_up_hits(packet, ray, lookup, surfaces, lanes)
-        for k in range(width):
-            face = get_hit(packet, k)[0]
-            is_escaping = packet.is_active[k] != 0 and face < 0
-            escapes[first + k, ray >> 3] |= is_escaping << (ray & 7)
-            for row in range(texture.shape[0]):
-                texture[row, first + k, ray] = lanes.texture[row, k]
-            passes_glass = packet.is_active[k] != 0 and face >= 0 and is_glass(surfaces, face)
-            patch[first + k, ray] = NO_PATCH if passes_glass else lanes.patches[k]
-        if follows:
-            before = end
-            end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
-            if end > before:
-                _load_points(points, first, width, packet)
+    num_probes, num_escaping = width * ((num_rays + _PROBING - 1) // _PROBING), 0
+    for begin in range(_PROBING):
+        if begin == 1 and num_rays >= _FEW_PROBES:
+            if num_escaping == num_probes:
+                hits[1][first : first + width] = 255
+            if num_escaping == num_probes or (num_escaping == 0 and not is_lit):
+                break
+        for ray in range(begin, num_rays, _PROBING):
+            if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
+                continue
+            trace_hits(packet)
+            for k in range(LANES):
+                lanes.distance[k] = 0
+            look_up_hits(packet, ray, lookup, surfaces, lanes)
+            num_escaping += _store_hits(packet, lanes, ray, first, width, surfaces, hits)
+            if follows:
+                before = end
+                end = follow(packet, ray, num_rays, first, width, lookup, surfaces, lanes, paths, end)
+                if end > before:
+                    _load_points(points, first, width, packet)
     return end
+
+
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def _is_lit(lookup, surfaces):  # type: ignore[no-untyped-def]
+    """True if rays that meet a surface may bring light: of a patch, of a lobe or through glass."""
+    is_lit = surfaces.quantile.shape[0] > 0 or surfaces.glass.shape[0] > 0
+    for k in range(lookup.tree.roots.shape[0]):
+        is_lit |= lookup.tree.roots[k] != NO_PATCH_NODE
+    return is_lit
 
 
 @nb.njit(nogil=True, cache=True)
@@ -230,6 +262,7 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
     """
     packet, lanes, end = new_packet(tracer), allocate_lanes(), np.int64(0)
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
+    is_lit = _is_lit(lookup, surfaces)
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for k in range(LANES):
@@ -238,8 +271,8 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
             shifts[0, k], shifts[1, k] = lobe_shift(pattern, points.seed[p])
             lanes.spread[k] = _ray_spacing(pattern, levels[k], half_vector_spread(footprint, p))
         end = _trace_packet(
-            packet, lanes, (shifts, levels), points, wo, footprint, lookup, surfaces, pattern, first, width, hits,
-            paths, end,
+            packet, lanes, (shifts, levels, is_lit), points, wo, footprint, lookup, surfaces, pattern, first, width,
+            hits, paths, end,
         )  # fmt: skip
     return end
 
@@ -279,7 +312,7 @@ def trace_lobe_rays(
         capacity = (stop - start) * num_rays * surfaces.max_entries
         paths = LobePaths.allocate(capacity - 1, capacity, num_slots)
         num_paths = _trace(*args, start, stop, (patch, escapes, texture), paths)
-        order = np.argsort(paths.first[:num_paths], kind="stable")
+        order = np.lexsort((paths.ray[:num_paths], paths.first[:num_paths]))
         found[start] = LobePaths._make(array[:num_paths][order] for array in paths)
 
     num_in_range = _POINTS_PER_RANGE * max(_FEW_RAYS // num_rays, 1)

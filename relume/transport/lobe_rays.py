@@ -33,6 +33,7 @@ from relume.raytrace.lobe_directions import (
     lobe_density,
     lobe_ray,
     lobe_shift,
+    lobe_vector,
     mirrored_axis,
     ray_jitter,
 )
@@ -439,12 +440,15 @@ def _list_lobe_rays(points, wo, footprint, level, hits, pattern, light_args, sta
             hit, is_escaping = patch[p, ray], (escapes[p, ray >> 3] >> (ray & 7)) & 1
             if (hit == NO_PATCH and not is_escaping and not is_path) or (is_escaping and not is_direct):
                 continue
-            (x, y, z), band = lobe_ray(pattern, point_level, ray, shift, o[0], o[1], o[2])
-            if z <= 0 or band < 0:
+            vector, band = lobe_vector(pattern, point_level, ray, shift)
+            (x, y, z), is_valid = lobe_ray(pattern, vector, o[0], o[1], o[2])
+            if z <= 0 or not is_valid:
                 continue
-            world, _ = lobe_ray_in_pixel(
-                pattern, point_level, ray, shift, n, t, wo[p], footprint[min(p, footprint.shape[0] - 1)], points.seed[p]
+            world, is_traced = lobe_ray_in_pixel(
+                pattern, vector, ray, n, t, wo[p], footprint[min(p, footprint.shape[0] - 1)], points.seed[p]
             )
+            if not is_traced:
+                continue
             is_passing = is_path and paths.kind[path - 1] == TRANSMISSION
             light = (_ZERO, _ZERO, _ZERO)
             if is_escaping or (is_passing and is_direct):

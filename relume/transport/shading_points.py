@@ -99,10 +99,10 @@ class GatherRays:
         return int(list_gather_rays(receivers.points, receivers.wo, *ray_args, listed))
 
     def sum(self, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, "m 3"]:
-        """Return the irradiance of `receivers` [start, stop) from all of their rays."""
+        """Return the irradiance of `receivers` [start, stop) from their cosine rays."""
         total = np.empty((stop - start, 3), np.float32)
         ray_args = self.gather_hits, self.pattern, self.outgoing, start, stop, allocate_scratch(self.max_rays_per_point)
-        sum_gather_rays(receivers.points, receivers.wo, *ray_args, total)
+        sum_gather_rays(receivers.points, *ray_args, total)
         return total
 
 

@@ -149,10 +149,12 @@ def image_numpy(model, bands, receivers):
 
 
 def test_rays_of_view_independent_terms_are_summed(lights, receivers):
-    """Nothing is listed; back faces reflect nothing."""
+    """Cosine rays alone, and nothing is listed; back faces reflect nothing."""
     bands = {"theta_i": np.full((3, 64), [[0.5], [1.0], [0.25]])}
     behind = replace(receivers, wo=np.where(np.arange(30)[:, None] < 3, -receivers.wo, receivers.wo))
-    expected = image_numpy("lambert", bands, behind)
+    (rays,) = receivers.rays
+    cosine_rays = replace(rays, gather_hits=rays.gather_hits[:, :20], pattern=make_pattern(20, 0, 7))
+    expected = image_numpy("lambert", bands, replace(behind, rays=(cosine_rays,)))
     actual = image("lambert", bands, None, lights, behind)
     np.testing.assert_allclose(actual, expected, rtol=2e-5, atol=1e-6 * expected.max())
     assert expected[3:].min() > 0

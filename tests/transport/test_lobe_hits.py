@@ -12,7 +12,7 @@ from relume.brdf.roughness_levels import NO_LEVELS
 from relume.brdf.term_validation import complete_term
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.camera_rays import trace_rays
-from relume.raytrace.lobe_directions import lobe_shift, make_lobe_pattern
+from relume.raytrace.lobe_directions import lobe_shift, lobe_vector, make_lobe_pattern
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.surface_textures import TextureCoordinates, Textures, concatenate_textures
@@ -63,8 +63,8 @@ def points():
 def directions(pattern, points, wo):
     rays = [
         lobe_ray_in_pixel(
-            pattern, 0, ray, lobe_shift(pattern, points.seed[p]), points.normal[p], points.tangent[p], wo[p],
-            NO_FOOTPRINT[0], points.seed[p],
+            pattern, lobe_vector(pattern, 0, ray, lobe_shift(pattern, points.seed[p]))[0], ray, points.normal[p],
+            points.tangent[p], wo[p], NO_FOOTPRINT[0], points.seed[p],
         )[0]
         for p in range(NUM)
         for ray in range(pattern.num_rays)
@@ -87,6 +87,25 @@ def test_rays_meet_what_single_rays_meet(geometry, lookup, points):
     assert 0.2 < escapes(hits).mean() < 0.8
     assert set(hits.patch[(face >= 0) & is_above]) == {9}
     assert len(hits.paths.ray) == 0
+
+
+@pytest.mark.parametrize("has_patches", [False, True])
+def test_a_quarter_of_the_rays_decides_where_lobes_are_uniform(geometry, lookup, points, has_patches):
+    """Without patches it does not matter what they meet. Fewer than one ray in a thousand differ."""
+    if not has_patches:
+        dark = lookup.tree._replace(roots=np.full(4, NO_PATCH_NODE, np.int32))
+        lookup = lookup._replace(tree=dark)
+    surface_points, wo = points
+    order = np.argsort(surface_points.position[:, 0])
+    surface_points, wo = surface_points.rows(order), wo[order]
+    pattern = make_lobe_pattern(sample_lobe(CHROME, NO_LEVELS), 55, 7)
+    hits = trace_lobe_rays(geometry, lookup, NO_SURFACES, surface_points, wo, NO_FOOTPRINT, None, pattern)
+    direction = directions(pattern, surface_points, wo)
+    face = trace_rays(geometry.embree, np.repeat(surface_points.position, 55, axis=0), direction).face.reshape(NUM, 55)
+    is_above = direction[:, 1].reshape(NUM, 55) > 0
+    assert np.mean((escapes(hits) != (face < 0))[is_above]) < 1e-3
+    assert np.mean(((hits.patch == 9) != ((face >= 0) & has_patches))[is_above]) < 1e-3
+    assert 0.2 < escapes(hits).mean() < 0.8
 
 
 def polished_ceiling(geometry, blur=0.0, curvature=0.0):

@@ -27,6 +27,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.lobe_directions import (
     LobePattern,
     lobe_shift,
+    lobe_vector,
 )
 from relume.transport.lobe_hits import half_vector_spread, lobe_ray_in_pixel, trace_lobe_rays
 from relume.transport.lobe_paths import ESCAPE, REFLECTION, TRANSMISSION
@@ -123,8 +124,9 @@ def _mean_radiance(points, wo, footprint, hits, pattern, light_args, environment
             first_entry = path
             while path < last_path and paths.ray[path] == ray:
                 path += 1
+            vector, _ = lobe_vector(pattern, 0, ray, shift)
             world, is_traced = lobe_ray_in_pixel(
-                pattern, 0, ray, shift, points.normal[p], points.tangent[p], wo[p],
+                pattern, vector, ray, points.normal[p], points.tangent[p], wo[p],
                 footprint[min(p, footprint.shape[0] - 1)], points.seed[p],
             )  # fmt: skip
             num += is_traced
