@@ -89,7 +89,7 @@ def test_curves_follow_in_a_swapped_environment(plain, map_name):
 
 def test_the_scenes_own_map_from_the_library_changes_nothing(plain, library, tmp_path):
     own = store_environment(library, write_map(tmp_path / "own.exr", still_life().environment.radiance), "Own")
-    images = [render_image(plain, "front", make_look(plain, under(name))) for name in (None, own.map)]
+    images = [render_image(plain, "front", make_look(plain, under(name))) for name in (None, own.reference)]
     assert relative_rmse(images[1], images[0]) < 1e-5
 
 
