@@ -48,7 +48,11 @@ class Target:
 def average_blocks(
     image: Shaped[F32, "height width channels"], weights: Shaped[F32, "height width"], side: int
 ) -> Shaped[F32, "rows columns channels"]:
-    """Average an image over blocks of about `side` × `side` pixels; pixels without weight count where no other is."""
+    """Average an image over blocks of about `side` × `side` pixels, by weights; without any, all pixels count.
+
+    Args:
+        image: linear radiance. weights: of its pixels. side: of a block, in pixels.
+    """
     size, some = _block_size(weights, side), np.maximum(weights, _LEAST_WEIGHT)[..., None]
     return np.asarray(downsample(image * some, size) / downsample(some, size), np.float32)
 

@@ -181,7 +181,11 @@ def _common_factor(gains: Sequence[Rgb], unit_gains: Sequence[Rgb]) -> Rgb | Non
 def gain_changes(
     before: Illumination, after: Illumination, groups: tuple[Illumination, ...]
 ) -> Mapping[Illumination, Rgb]:
-    """Return the difference of two lights as vectors of `grouped_gains`, without elements that are equal."""
+    """Return the difference of two lights as vectors of `grouped_gains`, without elements that are equal.
+
+    Args:
+        before, after: the lights. groups: from `group_lights`.
+    """
     old, new = grouped_gains(before, groups), grouped_gains(after, groups)
     change = {e: _sum(new.get(e, _ZERO_GAIN), old.get(e, _ZERO_GAIN), -1.0) for e in {**old, **new}}
     return MappingProxyType({element: gain for element, gain in change.items() if any(gain)})
