@@ -27,5 +27,6 @@ effect(() => {
   const curve = curvePath.value;
   clearCurvePreview();
   stage.clearBrush();
-  if (curve !== null) prepareCurve(curve);
+  // after the edit that has brought the curve, which is sent when the look has changed
+  if (curve !== null) queueMicrotask(() => curve === curvePath.peek() && prepareCurve(curve));
 });

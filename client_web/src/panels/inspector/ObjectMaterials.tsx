@@ -46,7 +46,9 @@ function OwnObjects({ name, material, base }: { name: string; material: Material
         objects={sharedObjects(look.value?.materials ?? {}, base)}
         onSelect={(object) => addObject(name, object)}
       />
-      <button onClick={() => rejoin(name, material)}>Use “{base}” again</button>
+      <button class="object-material" onClick={() => rejoin(name, material)}>
+        Use “{base}” again
+      </button>
     </Section>
   );
 }
@@ -60,7 +62,12 @@ export function ObjectMaterials({ name, material }: { name: string; material: Ma
   return (
     <Section title="Objects" count={info.objects.length}>
       {own.map((each) => (
-        <button key={each.name} title={each.objects.join(", ")} onClick={() => selectMaterial(each.name)}>
+        <button
+          key={each.name}
+          class="object-material"
+          title={each.objects.join(", ")}
+          onClick={() => selectMaterial(each.name)}
+        >
           {each.name}
         </button>
       ))}
