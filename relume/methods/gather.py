@@ -4,7 +4,7 @@ Besides the arrays of `relume.methods.view_stages`: surface patches, the lights 
 patches and view samples. Only the patch that each ray hits is stored; directions are generated again from a seed.
 Stages after those of the views: "patches", then "gather rays" (rows of patches, rows of each view).
 
-    scene/uvs, textures/<k>                     relume.raytrace.surface_textures
+    scene/uvs, textures/<k>, roughness/<k>      relume.raytrace.surface_textures
     patches/axis, value, children, roots        relume.patches.patch_kdtree.PatchTree
     patches/position, normal, material, …       relume.patches.patches.Patches
     patches/visibility                          lights visible from the sample points of patches, patch by patch

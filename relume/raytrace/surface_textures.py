@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.brdf.texture_slots import TEXTURES, EmissionImage, NormalMap
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.images.image_store import load_emission_image, load_normal_map, load_texture
+from relume.math.uv_transform import UvTransform
 from relume.raytrace.surface_interaction import triplanar_uvs
 from relume.raytrace.texture import MipMap
 from relume.scene.model import WRAPS, Scene, Texture
@@ -28,10 +29,14 @@ _MAX_VALUE = 6e4  # of half precision
 def texture_attributes(scene: Scene) -> dict[str, Any]:
     """Return the attributes of a store that describe the textures of a scene's materials.
 
-    They are the texture of each material in each of `TEXTURES`, its normal map and its emission image, −1 for none, and
-    the wrap modes of each texture.
+    They are the texture of each material in each of `TEXTURES`, its normal map, its emission image and its roughness
+    map, −1 for none, and the wrap modes of each texture and of each roughness map.
     """
-    index = {id(texture): k for k, texture in enumerate(_textures_of(scene))}
+    index = {
+        id(texture): k
+        for textures in (_textures_of(scene), _roughness_maps(scene))
+        for k, texture in enumerate(textures)
+    }
 
     def index_of(texture: Texture | None) -> int:
         return -1 if texture is None else index[id(texture)]
@@ -40,20 +45,27 @@ def texture_attributes(scene: Scene) -> dict[str, Any]:
         "textures": [[index_of(m.textures.get(name)) for name in TEXTURES] for m in scene.materials],
         "normal_maps": [index_of(m.normal_map) for m in scene.materials],
         "emission_images": [index_of(m.textures.get("emission")) for m in scene.materials],
-        "wraps": [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in _textures_of(scene)],
+        "roughness_maps": [index_of(m.textures.get("roughness")) for m in scene.materials],
+        "wraps": _wraps(_textures_of(scene)),
+        "roughness_wraps": _wraps(_roughness_maps(scene)),
     }
+
+
+def _wraps(textures: Sequence[Texture]) -> list[list[int]]:
+    return [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in textures]
 
 
 def texture_arrays(scene: Scene) -> dict[str, NDArray[Any]]:
     """Return the textures of a scene as arrays of a store: each once, at most `MAX_TEXTURE_SIDE` wide and high.
 
     Returns:
-        "textures/<k>", (height, width, 3) float16.
+        "textures/<k>", (height, width, 3) float16; "roughness/<k>", (height, width, 1) float16.
     """
-    textures = _textures_of(scene)
-    side = _max_side(textures)
-    finest = [np.minimum(_level_pixels(texture, side), _MAX_VALUE) for texture in textures]
-    return {f"textures/{k}": pixels.astype(np.float16) for k, pixels in enumerate(finest)}
+    textures, roughness = _textures_of(scene), _roughness_maps(scene)
+    side = _max_side([*textures, *roughness])
+    paths = [f"textures/{k}" for k in range(len(textures))] + [f"roughness/{k}" for k in range(len(roughness))]
+    finest = (np.minimum(_level_pixels(texture, side), _MAX_VALUE) for texture in (*textures, *roughness))
+    return {path: pixels.astype(np.float16) for path, pixels in zip(paths, finest, strict=True)}
 
 
 def _textures_of(scene: Scene) -> list[Texture]:
@@ -63,6 +75,12 @@ def _textures_of(scene: Scene) -> list[Texture]:
         for m in scene.materials
         for texture in (*(m.textures.get(name) for name in TEXTURES), m.normal_map, m.textures.get("emission"))
     )
+    return list({id(texture): texture for texture in textures if texture is not None}.values())
+
+
+def _roughness_maps(scene: Scene) -> list[Texture]:
+    """Return the roughness maps of a scene's materials, each once."""
+    textures = (m.textures.get("roughness") for m in scene.materials)
     return list({id(texture): texture for texture in textures if texture is not None}.values())
 
 
@@ -235,4 +253,27 @@ def project_missing(
     faces, scale = coordinates.faces.copy(), coordinates.scale.copy()
     faces[flat] = len(coordinates.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
     scale[flat] = 1
+    return TextureCoordinates(uvs, faces, scale)
+
+
+def transform_coordinates(
+    coordinates: TextureCoordinates,
+    face_material: Shaped[NDArray[np.integer], " faces"],
+    transforms: Sequence[UvTransform | None],
+) -> TextureCoordinates:
+    """Transform the texture coordinates of triangles.
+
+    Args:
+        coordinates: of all triangles. face_material: their materials. transforms: of each material, None for none.
+    """
+    uvs, faces, scale = coordinates
+    for material, transform in enumerate(transforms):
+        moved = np.flatnonzero(face_material == material)
+        if transform is None or not len(moved):
+            continue
+        corners, index = np.unique(faces[moved], return_inverse=True)  # other materials may share corners
+        faces, scale = faces.copy(), scale.copy()
+        faces[moved] = (len(uvs) + index.reshape(-1, 3)).astype(np.uint32)
+        scale[moved] *= np.float32(transform.side_factor)
+        uvs = np.concatenate([uvs, transform.points(uvs[corners])])
     return TextureCoordinates(uvs, faces, scale)
