@@ -2,7 +2,7 @@
 
 Its store holds the arrays of `relume.methods.view_stages`, and:
 
-    textures/<k>, roughness/<k>                 relume.raytrace.surface_textures
+    textures/<k>, roughness/<k>                 relume.raytrace.texture_arrays
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from relume.methods import plan_estimates
 from relume.methods.view_stages import SampledViews
-from relume.raytrace.surface_textures import texture_arrays, texture_attributes
+from relume.raytrace.texture_arrays import texture_arrays, texture_attributes
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 
