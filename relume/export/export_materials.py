@@ -204,7 +204,8 @@ def _with_transform(surface: SurfaceParameters, uv: UvTransform | None) -> Surfa
     if uv is None:
         return surface
     images = {name: value for name, value in vars(surface).items() if isinstance(value, ImageInput)}
-    return replace(surface, **{name: replace(image, transform=uv) for name, image in images.items()})
+    placed: dict[str, Any] = {name: replace(image, transform=uv) for name, image in images.items()}
+    return replace(surface, **placed)
 
 
 def _parameters(layer: Mapping[str, Any], fit: PrincipledFit) -> SurfaceParameters:

@@ -34,11 +34,7 @@ class GltfMaterials:
         """Return a material of glTF; its error and what it omits are in `extras.relume`."""
         surface = material.surface
         base, packed = self._with_alpha(material.name, surface), self._packed(material.name, surface)
-        roughness_texture = (
-            {}
-            if packed is None
-            else {"metallicRoughnessTexture": {"index": self._add_texture(packed), **_transform(packed.transform)}}
-        )
+        roughness_texture = self._texture("metallicRoughnessTexture", packed)
         alpha = 1.0 if isinstance(surface.alpha, ImageInput) else surface.alpha
         extensions = self._extensions(surface)
         return {

@@ -33,7 +33,7 @@ class UvTransform(NamedTuple):
     def matrix(self) -> Shaped[F64, "2 2"]:
         """The linear part A."""
         cosine, sine = np.cos(self.rotation), np.sin(self.rotation)
-        return np.array([[cosine, sine], [-sine, cosine]]) * np.array(self.scale)
+        return np.asarray(np.array([[cosine, sine], [-sine, cosine]]) * np.array(self.scale))
 
     @property
     def side_factor(self) -> float:

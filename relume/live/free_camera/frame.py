@@ -125,8 +125,10 @@ class MaterialState(NamedTuple):
         """
         none = [None] * len(terms)
         overrides = tuple(
-            ProbeMapOverrides(user_images(material_terms), *maps)
-            for material_terms, *maps in zip(terms, normals or none, emission or none, uv or none, strict=True)
+            ProbeMapOverrides(user_images(material_terms), normal_map, image, transform)
+            for material_terms, normal_map, image, transform in zip(
+                terms, normals or none, emission or none, uv or none, strict=True
+            )
         )
         cached = previous.projected if previous is not None else [None] * len(terms)
         projected = [
