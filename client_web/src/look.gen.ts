@@ -113,11 +113,12 @@ export interface Look {
   display: DisplayLook;
 }
 
-/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it. `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate. `base` and `objects`: of a material that the look adds; it is that of these objects instead of the scene's material `base`. Null for materials of the scene. */
+/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. `uv` transforms the texture coordinates of all its images. `glass`: only materials that transmit light in the scene have it. `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate. `base` and `objects`: of a material that the look adds; it is that of these objects instead of the scene's material `base`. Null for materials of the scene. */
 export interface MaterialLook {
   terms: TermLook[];
   shadow_catcher?: boolean;
   normal_map?: NormalMapLook | null;
+  uv?: UvLook | null;
   glass?: GlassLook | null;
   basis_functions?: 1 | 3 | 6 | 10 | 15 | 21 | 28 | 36 | null;
   base?: string | null;
@@ -281,6 +282,13 @@ export interface TubeLook {
   direction: [number, number, number];
   radius: number;
   length: number;
+}
+
+/** Transform of a material's texture coordinates: `scale`, then `rotation` in degrees, then `offset`, as in glTF's KHR_texture_transform. See `relume.math.uv_transform`. */
+export interface UvLook {
+  scale?: [number, number];
+  rotation?: number;
+  offset?: [number, number];
 }
 
 export type LightLook =

@@ -26,6 +26,7 @@ from relume.brdf.specular import specular_albedo
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
 from relume.brdf.texture_slots import TEXTURES, Images, NormalMap, texture_slot, user_images
 from relume.core.digest import digest
+from relume.math.uv_transform import UvTransform
 from relume.math.zernike import OUTGOING_DEGREE, basis_functions, recurrence
 
 F32 = NDArray[np.float32]
@@ -67,6 +68,7 @@ class Reflectance:
         images: that a look uses instead of each of the material's `TEXTURES`.
         mirrors: terms that are at least partly mirrors. lobes: highlights that the basis does not represent.
         normals: the image that a look uses instead of the material's normal map.
+        uv: transform of the texture coordinates of `images`.
         digest: of all others; two materials with equal digests are equal.
     """
 
@@ -75,10 +77,11 @@ class Reflectance:
     mirrors: Documents = field(compare=False, repr=False)
     lobes: Documents = field(compare=False, repr=False)
     normals: NormalMap | None = field(compare=False, repr=False)
+    uv: UvTransform | None = field(compare=False, repr=False)
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:
-        content = self.matrix.tobytes(), self.images, self.mirrors, self.lobes, self.normals
+        content = self.matrix.tobytes(), self.images, self.mirrors, self.lobes, self.normals, self.uv
         object.__setattr__(self, "digest", digest(content))
 
     @property
@@ -107,13 +110,17 @@ Reflectances = tuple[Reflectance, ...]
 """One per material."""
 
 
-def material_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None = None) -> Reflectance:
+def material_reflectance(
+    terms: Sequence[Mapping[str, Any]], normals: NormalMap | None = None, uv: UvTransform | None = None
+) -> Reflectance:
     """Return the reflectance of a material, summed over its terms.
 
     Args:
         terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
+        uv: transform of texture coordinates; None for the identity.
     """
-    return _sum_reflectance(tuple(map(FrozenTerm.from_document, terms)), normals)
+    images = user_images(terms)
+    return _sum_reflectance(tuple(map(FrozenTerm.from_document, terms)), normals, uv if any(images) else None)
 
 
 @lru_cache(maxsize=1)
@@ -124,7 +131,9 @@ def _white_albedo() -> float:
 
 
 @lru_cache(maxsize=256)
-def _sum_reflectance(frozen_terms: tuple[FrozenTerm, ...], normals: NormalMap | None) -> Reflectance:
+def _sum_reflectance(
+    frozen_terms: tuple[FrozenTerm, ...], normals: NormalMap | None, uv: UvTransform | None
+) -> Reflectance:
     total, terms = np.zeros((1 + len(TEXTURES), 3, len(PAIRS))), [term.document for term in frozen_terms]
     highlights = [term for term in terms if not scatters_diffusely(term)]
     lobes = narrow_lobes(highlights)
@@ -133,7 +142,7 @@ def _sum_reflectance(frozen_terms: tuple[FrozenTerm, ...], normals: NormalMap | 
     for term in lobes or highlights:
         total[texture_slot(term)] += quantized_reflectance(term)
     mirrors = [_quantize_parameters(term) for term in highlights if specular_albedo(term).any()]
-    return Reflectance(total.astype(np.float32), user_images(terms), tuple(mirrors), tuple(lobes), normals)
+    return Reflectance(total.astype(np.float32), user_images(terms), tuple(mirrors), tuple(lobes), normals, uv)
 
 
 def quantized_reflectance(term: Mapping[str, Any]) -> Shaped[F64, "3 pairs"]:

@@ -12,6 +12,7 @@ from relume.assets.asset_store import AssetStore
 from relume.brdf.registry import TERMS
 from relume.core.errors import SceneError
 from relume.core.validation import Pointer, invalid_value
+from relume.math.uv_transform import UvTransform
 
 TEXTURES = ("diffuse", "specular")
 ROUGHNESS = "roughness"
@@ -26,10 +27,12 @@ class NormalMap(NamedTuple):
 
     Attributes:
         image: "image:<id>" of an uploaded image. scale: factor of the x and y of its normals, as in glTF.
+        uv: transform of its texture coordinates; None: as they are.
     """
 
     image: str
     scale: float = 1.0
+    uv: UvTransform | None = None
 
 
 class EmissionImage(NamedTuple):

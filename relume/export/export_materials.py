@@ -22,6 +22,8 @@ from relume.look import Look, MaterialLook
 from relume.look.glass import with_glass_look
 from relume.look.model import MeshLook
 from relume.look.single_lights import single_lights
+from relume.look.uv_transforms import check_uv_transforms, fixed_images
+from relume.math.uv_transform import UvTransform
 from relume.scene.model import Glass, Material, Scene, Texture
 from relume.scene.texture_encoding import decode
 from relume.scene.triplanar import find_triplanar
@@ -82,8 +84,10 @@ class MaterialExporter:
         """Return all materials of the scene as a look shows them, in the scene's order.
 
         Raises:
-            NotFoundError: an image or measured data of the look do not exist. SceneError: they are damaged.
+            ParameterError: the look transforms images that cannot be transformed. NotFoundError: an image or measured
+                data of the look do not exist. SceneError: they are damaged.
         """
+        check_uv_transforms(look, fixed_images(self._scene))
         lights = {
             light.material: light for light in single_lights(self._scene, look).values() if isinstance(light, MeshLook)
         }
@@ -118,7 +122,8 @@ class MaterialExporter:
             **self._alpha(material),
         )
         omitted = _omitted(material, look, is_projected=self._is_projected[index] and bool(user_maps(terms)))
-        return ExportMaterial(material.name, surface, material.double_sided, error, omitted)
+        placed = _with_transform(surface, look.uv_transform)
+        return ExportMaterial(material.name, placed, material.double_sided, error, omitted)
 
     def _roughness(self, fit: PrincipledFit, texture: Texture | None, material: Material) -> float | ImageInput:
         """Roughness times its map; roughness above 1 is clamped."""
@@ -141,15 +146,17 @@ class MaterialExporter:
         texture = material.normal_map if look.normals is None else load_normal_map(look.normals)
         if texture is None:
             return None
-        encoding = texture.encoding
-        if encoding is not None and encoding.turn == 0:
+        encoding, uv = texture.encoding, look.uv_transform or UvTransform()
+        if encoding is not None and encoding.turn == 0 and uv.tangent_angle == 0 and not uv.is_mirrored:
             file = self._images.add(f"{material.name} normals", ("bytes", id(texture)), lambda: texture.pixels)
             return ImageInput(file, factor=(encoding.scale[0],) * 3, wrap=texture.wrap)
 
         def make_pixels() -> NDArray[np.uint8]:
-            return np.asarray(np.rint(127.5 * (decode(texture.pixels, encoding) + 1)), np.uint8)
+            normals = uv.normals(decode(texture.pixels, encoding))
+            return np.asarray(np.rint(127.5 * (normals + 1)), np.uint8)
 
-        file = self._images.add(f"{material.name} normals", ("normals", id(texture)), make_pixels)
+        key = "normals", id(texture), uv.tangent_angle, uv.is_mirrored
+        file = self._images.add(f"{material.name} normals", key, make_pixels)
         return ImageInput(file, wrap=texture.wrap)
 
     def _emission(self, material: Material, emission: tuple[float, float, float], image: str | None) -> dict[str, Any]:
@@ -190,6 +197,15 @@ def emissive_surface(radiance: tuple[float, float, float]) -> SurfaceParameters:
     color = rgb(np.array(radiance) / strength)
     black = SurfaceParameters(base_color=(0.0, 0.0, 0.0), specular=0.0)
     return replace(black, emission=color, emission_strength=strength)
+
+
+def _with_transform(surface: SurfaceParameters, uv: UvTransform | None) -> SurfaceParameters:
+    """Return a surface whose images have transformed texture coordinates."""
+    if uv is None:
+        return surface
+    images = {name: value for name, value in vars(surface).items() if isinstance(value, ImageInput)}
+    placed: dict[str, Any] = {name: replace(image, transform=uv) for name, image in images.items()}
+    return replace(surface, **placed)
 
 
 def _parameters(layer: Mapping[str, Any], fit: PrincipledFit) -> SurfaceParameters:

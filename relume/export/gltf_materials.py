@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from relume.export.export_images import ExportImages, resized
 from relume.export.export_materials import ExportMaterial
+from relume.math.uv_transform import UvTransform
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Color, Scalar
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
@@ -20,6 +21,7 @@ from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
 U8 = NDArray[np.uint8]
 AddTexture = Callable[[ImageInput], int]
 _DEFAULT = SurfaceParameters()
+TEXTURE_TRANSFORM = "KHR_texture_transform"
 
 
 class GltfMaterials:
@@ -32,7 +34,7 @@ class GltfMaterials:
         """Return a material of glTF; its error and what it omits are in `extras.relume`."""
         surface = material.surface
         base, packed = self._with_alpha(material.name, surface), self._packed(material.name, surface)
-        roughness_texture = {} if packed is None else {"metallicRoughnessTexture": {"index": self._add_texture(packed)}}
+        roughness_texture = self._texture("metallicRoughnessTexture", packed)
         alpha = 1.0 if isinstance(surface.alpha, ImageInput) else surface.alpha
         extensions = self._extensions(surface)
         return {
@@ -59,7 +61,7 @@ class GltfMaterials:
         if not isinstance(value, ImageInput):
             return {}
         scale = {"scale": value.factor[0]} if member == "normalTexture" and value.factor[0] != 1 else {}
-        return {member: {"index": self._add_texture(value), **scale}}
+        return {member: {"index": self._add_texture(value), **scale, **_transform(value.transform)}}
 
     def _with_alpha(self, name: str, surface: SurfaceParameters) -> Scalar | Color:
         """The base color, with the opacity as its alpha if that is an image."""
@@ -135,6 +137,14 @@ class GltfMaterials:
             "specular": surface.specular != 1 or surface.specular_color != _DEFAULT.specular_color,
         }
         return {f"KHR_materials_{name}": extensions[name] for name, applies in has_effect.items() if applies}
+
+
+def _transform(uv: UvTransform) -> dict[str, Any]:
+    """The extension of a texture whose coordinates are transformed."""
+    if uv == UvTransform():
+        return {}
+    members = {"offset": [*uv.offset], "rotation": uv.rotation, "scale": [*uv.scale]}
+    return {"extensions": {TEXTURE_TRANSFORM: members}}
 
 
 def _volume(surface: SurfaceParameters) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite, sqrt
+from math import degrees, isfinite, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from relume.export.base_layer import index_of_refraction
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial
 from relume.export.surface_values import microfacet_widths
+from relume.math.uv_transform import UvTransform
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Color, Value, scaled
 from relume.scene_io.surfaces.surface_parameters import BLACK, WHITE, SurfaceParameters
@@ -57,6 +59,16 @@ def open_pbr_inputs(material: ExportMaterial, images: ExportImages) -> Inputs:
     if surface.normal is not None:
         inputs["geometry_normal"] = surface.normal
     return inputs
+
+
+def place2d_inputs(uv: UvTransform) -> dict[str, Any]:
+    """Return the inputs of a node `place2d`, which scales by reciprocals and subtracts its offset."""
+    u, v = uv.translation_from_bottom
+    return {
+        "scale": (1 / uv.scale[0], 1 / uv.scale[1]),
+        "rotate": -degrees(uv.rotation),
+        "offset": (-u, -v),
+    }
 
 
 def omitted_from_open_pbr(material: ExportMaterial) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import degrees
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from relume.brdf.fresnel import normal_reflectance
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial
-from relume.export.open_pbr_inputs import ADDRESS_MODES, IMAGE_FOLDER, open_pbr_inputs
+from relume.export.open_pbr_inputs import ADDRESS_MODES, IMAGE_FOLDER, open_pbr_inputs, place2d_inputs
+from relume.math.uv_transform import UvTransform
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Color, Value, scaled
 from relume.scene_io.surfaces.surface_parameters import WHITE, SurfaceParameters
@@ -74,12 +76,27 @@ class UsdMaterials:
             _set(texture, f"wrap{axis}", "Token", wrap)
         _set(texture, "scale", "Float4", tuple(map(float, scale)))
         _set(texture, "bias", "Float4", tuple(map(float, bias)))
-        output = coordinates.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-        texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(output)
+        placed = self._placed(coordinates, value.transform)
+        texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(placed)
         channel = "rgb" if value.channel == "rgb" else "r"
         types = Sdf.ValueTypeNames
         result = texture.CreateOutput(channel, types.Float3 if channel == "rgb" else types.Float)
         shader.CreateInput(name, getattr(types, kind)).ConnectToSource(result)
+
+    def _placed(self, coordinates: Any, uv: UvTransform) -> Any:
+        """Output of texture coordinates with a transform, the same for all images of a material."""
+        from pxr import Sdf
+
+        kind = Sdf.ValueTypeNames.Float2
+        output = coordinates.CreateOutput("result", kind)
+        if uv == UvTransform():
+            return output
+        transform = self._shader(coordinates.GetPath().GetParentPath(), "st_transform", "UsdTransform2d")
+        transform.CreateInput("in", kind).ConnectToSource(output)
+        _set(transform, "scale", "Float2", uv.scale)
+        _set(transform, "rotation", "Float", degrees(uv.rotation))
+        _set(transform, "translation", "Float2", uv.translation_from_bottom)
+        return transform.CreateOutput("result", kind)
 
     def _open_pbr(self, path: Any, inputs: dict[str, Value]) -> Any:
         from pxr import Sdf
@@ -107,6 +124,10 @@ class UsdMaterials:
         image.GetInput("file").GetAttr().SetColorSpace("srgb_texture" if value.is_srgb else "raw")
         for axis, wrap in zip("uv", value.wrap, strict=True):
             _set(image, f"{axis}addressmode", "String", ADDRESS_MODES[wrap])
+        if value.transform != UvTransform():
+            image.CreateInput("texcoord", Sdf.ValueTypeNames.Float2).ConnectToSource(
+                self._place2d(path, value.transform)
+            )
         value_type = getattr(Sdf.ValueTypeNames, kind)
         output = image.CreateOutput("out", value_type)
         if kind == "Float3":
@@ -119,6 +140,18 @@ class UsdMaterials:
             _set(node, "in2", kind, value.factor if kind == "Color3f" else value.factor[0])
         node.CreateInput(source, value_type).ConnectToSource(output)
         return node.CreateOutput("out", value_type)
+
+    def _place2d(self, path: Any, uv: UvTransform) -> Any:
+        """Output of transformed texture coordinates, the same for all images of a material."""
+        from pxr import Sdf
+
+        kind = Sdf.ValueTypeNames.Float2
+        coordinates = self._shader(path, "texcoord", "ND_texcoord_vector2")
+        place = self._shader(path, "place2d", "ND_place2d_vector2")
+        place.CreateInput("texcoord", kind).ConnectToSource(coordinates.CreateOutput("out", kind))
+        for name, value in place2d_inputs(uv).items():
+            _set(place, name, "Float" if name == "rotate" else "Float2", value)
+        return place.CreateOutput("out", kind)
 
     def _asset(self, value: ImageInput) -> str:
         self.files[value.file] = None

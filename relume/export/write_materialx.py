@@ -11,7 +11,14 @@ from relume.core.filesystem import atomic_write
 from relume.export.export_document import ExportDocument
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial
-from relume.export.open_pbr_inputs import ADDRESS_MODES, IMAGE_FOLDER, omitted_from_open_pbr, open_pbr_inputs
+from relume.export.open_pbr_inputs import (
+    ADDRESS_MODES,
+    IMAGE_FOLDER,
+    omitted_from_open_pbr,
+    open_pbr_inputs,
+    place2d_inputs,
+)
+from relume.math.uv_transform import UvTransform
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Value
 from relume.scene_io.surfaces.surface_parameters import WHITE
@@ -115,6 +122,8 @@ class _MaterialWriter:
             file.setColorSpace("srgb_texture")
         for axis, wrap in zip("uv", value.wrap, strict=True):
             image.setInputValue(f"{axis}addressmode", ADDRESS_MODES[wrap], "string")
+        if value.transform != UvTransform():
+            image.addInput("texcoord", "vector2").setNodeName(self._placed(name, value.transform))
         self.files[value.file] = None
         if value.factor == WHITE or type_name == "vector3":
             return image
@@ -123,6 +132,20 @@ class _MaterialWriter:
         factor = self._mx.Color3(*value.factor) if type_name == "color3" else float(value.factor[0])
         product.setInputValue("in2", factor, type_name)
         return product
+
+    def _placed(self, name: str, uv: UvTransform) -> str:
+        """Name of the node of transformed texture coordinates, the same for all images of a material."""
+        place = self._document.getNode(f"{name}_place2d")
+        if place is None:
+            coordinates = self._document.addNode("texcoord", f"{name}_texcoord", "vector2")
+            place = self._document.addNode("place2d", f"{name}_place2d", "vector2")
+            place.addInput("texcoord", "vector2").setNodeName(coordinates.getName())
+            for key, value in place2d_inputs(uv).items():
+                if key == "rotate":
+                    place.setInputValue(key, float(value), "float")
+                else:
+                    place.setInputValue(key, self._mx.Vector2(*value), "vector2")
+        return str(place.getName())
 
     def _normals(self, name: str, value: ImageInput) -> Any:
         image = self._image(name, "geometry_normal", value, "vector3")

@@ -30,6 +30,7 @@ from relume.core.cache import asset_cached
 from relume.core.color import srgb_encode
 from relume.core.import_warnings import ImporterWarning, warning_of
 from relume.image_io.write_image import png_bytes, to_bytes
+from relume.images.own_textures import is_own_texture, load_own_texture
 from relume.images.read_image import MAX_SIDE, read_image
 from relume.scene.model import WRAPS, Texture, TextureEncoding
 
@@ -210,16 +211,18 @@ def load_texture(name: str) -> Texture:
     Raises:
         NotFoundError: it does not exist. SceneError: its files are damaged.
     """
-    return _load(IMAGES.resolve(name))
+    return load_own_texture(name) if is_own_texture(name) else _load(IMAGES.resolve(name))
 
 
 def load_roughness_map(name: str) -> Texture:
     """Load the image of a term's `roughness_map`: roughness over its mean. Raises what `load_texture` raises."""
-    return _load_roughness(IMAGES.resolve(name))
+    return load_own_texture(name) if is_own_texture(name) else _load_roughness(IMAGES.resolve(name))
 
 
 def load_normal_map(map_: NormalMap) -> Texture:
     """Load the image of a material's `normal_map`: tangent-space normals. Raises what `load_texture` raises."""
+    if is_own_texture(map_.image):
+        return load_own_texture(map_.image)
     return _load_normals(IMAGES.resolve(map_.image), map_.scale)
 
 

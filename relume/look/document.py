@@ -28,6 +28,7 @@ from relume.look.light_validation import MAX_INTENSITY, complete_lights, default
 from relume.look.link_validation import check_link
 from relume.look.model import BackgroundKind, BasisFunctions, Look, PathFilter, ToneMap
 from relume.look.object_materials import check_not_emissive, default_materials
+from relume.look.uv_transforms import complete_uv
 from relume.luts.lut_store import LUTS
 from relume.scene.model import Light, Material
 
@@ -53,7 +54,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "lut": None,
     },
 }
-_OPTIONAL = {"normal_map": None, "glass": None, "basis_functions": None}  # of materials
+_OPTIONAL = {"normal_map": None, "uv": None, "glass": None, "basis_functions": None}  # of materials
 _SECTIONS = tuple(Look.model_fields)
 
 
@@ -150,10 +151,13 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
     normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map"))
     glass = _complete_glass((*pointer, "glass"), fields.pop("glass"), default[name].get("glass"))
     functions = _complete_basis_functions((*pointer, "basis_functions"), fields.pop("basis_functions"))
+    terms = _complete_terms((*pointer, "terms"), fields["terms"], before["terms"])
+    uv = complete_uv((*pointer, "uv"), fields.pop("uv"), terms)
     return {
         **fields,
-        "terms": _complete_terms((*pointer, "terms"), fields["terms"], before["terms"]),
+        "terms": terms,
         **normals,
+        **uv,
         **glass,
         **functions,
     }

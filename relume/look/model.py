@@ -6,6 +6,7 @@ Terms stay dictionaries, so that `relume.brdf.curves` handles looks and their JS
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import radians
 from typing import Annotated, Any, Literal, NamedTuple, NotRequired, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
@@ -17,6 +18,7 @@ from relume.image_io.display_transform import DisplayTransform
 from relume.image_io.ocio.view import OcioView
 from relume.look.object_links import link_object_materials
 from relume.luts.lut_store import load_table
+from relume.math.uv_transform import UvTransform
 
 Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
@@ -81,6 +83,15 @@ class NormalMapLook(_FrozenModel):
     scale: float = 1.0
 
 
+class UvLook(_FrozenModel):
+    """Transform of a material's texture coordinates: `scale`, then `rotation` in degrees, then `offset`, as in glTF's
+    KHR_texture_transform. See `relume.math.uv_transform`."""
+
+    scale: tuple[float, float] = (1.0, 1.0)
+    rotation: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+
+
 class GlassLook(_FrozenModel):
     """Light through a surface of glass; its material's terms are what it reflects.
 
@@ -103,7 +114,8 @@ class MaterialLook(_FrozenModel):
     """A material: the sum of its terms.
 
     A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects.
-    `normal_map` replaces the scene's own. `glass`: only materials that transmit light in the scene have it.
+    `normal_map` replaces the scene's own. `uv` transforms the texture coordinates of all its images.
+    `glass`: only materials that transmit light in the scene have it.
     `basis_functions`: while a free camera moves, all terms are the sum of this many functions of the in-out
     factorization, without separate highlights, to compare; null: as many as each term needs, highlights separate.
     `base` and `objects`: of a material that the look adds; it is that of these objects instead of the scene's material
@@ -113,6 +125,7 @@ class MaterialLook(_FrozenModel):
     terms: tuple[TermLook, ...]
     shadow_catcher: bool = False
     normal_map: NormalMapLook | None = None
+    uv: UvLook | None = None
     glass: GlassLook | None = None
     basis_functions: BasisFunctions | None = None
     base: str | None = None
@@ -122,7 +135,15 @@ class MaterialLook(_FrozenModel):
     def normals(self) -> NormalMap | None:
         """The normal map override; none for a shadow catcher, which hides its own surface."""
         normal_map = None if self.shadow_catcher else self.normal_map
-        return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale)
+        return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale, self.uv_transform)
+
+    @property
+    def uv_transform(self) -> UvTransform | None:
+        """The transform of texture coordinates; None for the identity."""
+        if self.uv is None:
+            return None
+        transform = UvTransform(self.uv.offset, radians(self.uv.rotation), self.uv.scale)
+        return None if transform == UvTransform() else transform
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))

@@ -26,7 +26,7 @@ from relume.methods import plan_estimates
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod, num_patches
 from relume.methods.probes import bound_store_bytes as parts_of_surface
-from relume.raytrace.surface_textures import MAX_TEXTURE_SIDE
+from relume.raytrace.texture_arrays import MAX_TEXTURE_SIDE
 from relume.scene.model import Scene
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.publish import array_paths

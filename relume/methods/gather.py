@@ -4,7 +4,7 @@ Besides the arrays of `relume.methods.view_stages`: surface patches, the lights 
 patches and view samples. Only the patch that each ray hits is stored; directions are generated again from a seed.
 Stages after those of the views: "patches", then "gather rays" (rows of patches, rows of each view).
 
-    scene/uvs, textures/<k>                     relume.raytrace.surface_textures
+    scene/uvs, textures/<k>, roughness/<k>      relume.raytrace.texture_arrays
     patches/axis, value, children, roots        relume.patches.patch_kdtree.PatchTree
     patches/position, normal, material, …       relume.patches.patches.Patches
     patches/visibility                          lights visible from the sample points of patches, patch by patch
@@ -36,7 +36,7 @@ from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import MAX_PATCHES
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches
 from relume.raytrace.gather_rays import make_pattern
-from relume.raytrace.surface_textures import texture_arrays, texture_attributes
+from relume.raytrace.texture_arrays import texture_arrays, texture_attributes
 from relume.raytrace.visibility_masks import trace_visibility_masks
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore

@@ -46,7 +46,7 @@ from relume.probes.visible_sides import visible_sides
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
-from relume.raytrace.surface_textures import texture_arrays, texture_attributes
+from relume.raytrace.texture_arrays import texture_arrays, texture_attributes
 from relume.raytrace.visibility import VisibilityBits, trace_visibility
 from relume.raytrace.visibility_masks import LightTargets, trace_visibility_masks
 from relume.scene.model import Scene

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from relume.brdf.albedo import Reflectances
 from relume.images.image_store import load_texture
 from relume.lights.spherical_triangles import TriangleLights
+from relume.math.uv_transform import UvTransform
 from relume.math.zernike import OUTGOING_DEGREE, recurrence
 from relume.radiosity.binned_transport import incident_by_bins, mean_incoming
 from relume.radiosity.bounce import irradiance
@@ -103,20 +104,21 @@ class PatchLight:
 
     def texture_multipliers(self, reflectances: Reflectances) -> F32:
         """Return texture multipliers, at least `MIN_TEXTURE`, with the look's map overrides. (2, C, 3) float32"""
-        image_names = [material_reflectance.images for material_reflectance in reflectances]
         multipliers = np.maximum(self.textures, MIN_TEXTURE)
-        for material, images in enumerate(image_names):
+        for material, reflectance in enumerate(reflectances):
             rows = np.flatnonzero(self.material == material)
-            for channel, name in enumerate(images):
+            for channel, name in enumerate(reflectance.images):
                 if name is not None:
-                    multipliers[channel, rows] = np.maximum(self._mean_texture(load_texture(name), rows), MIN_TEXTURE)
+                    mean = self._mean_texture(load_texture(name), rows, reflectance.uv)
+                    multipliers[channel, rows] = np.maximum(mean, MIN_TEXTURE)
         return multipliers
 
-    def _mean_texture(self, texture: Texture, rows: NDArray[np.intp]) -> F32:
+    def _mean_texture(self, texture: Texture, rows: NDArray[np.intp], transform: UvTransform | None) -> F32:
         """Return the texture values of patches, or the texture's mean without UV coordinates. (rows or 1, 3)"""
         if self.uv is None:
             return mean_value(texture)[None].astype(np.float32)
-        point_values = sample_image(texture, self.uv[rows].reshape(-1, self.uv.shape[2]))
+        uv = self.uv[rows].reshape(-1, self.uv.shape[2])
+        point_values = sample_image(texture, uv if transform is None else transform.footprints(uv))
         return np.asarray(point_values.reshape(len(rows), -1, 3).mean(axis=1), np.float32)
 
     def irradiance(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -12,75 +12,16 @@ from numpy.typing import NDArray
 from relume.brdf.texture_slots import TEXTURES, EmissionImage, NormalMap
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.images.image_store import load_emission_image, load_normal_map, load_texture
+from relume.math.uv_transform import UvTransform
 from relume.raytrace.surface_interaction import triplanar_uvs
 from relume.raytrace.texture import MipMap
-from relume.scene.model import WRAPS, Scene, Texture
+from relume.raytrace.texture_arrays import MAX_TEXTURE_SIDE, level_index
+from relume.scene.model import WRAPS, Texture
 from relume.store.bake_protocol import StoreReader
 
 F32 = NDArray[np.float32]
 
-MAX_TEXTURE_SIDE = 2048  # finer mip levels are not stored
-_MAX_TEXELS = 1 << 25  # of all finest levels together; 12 bytes each
 NORMAL_MAP, EMISSION = len(TEXTURES), len(TEXTURES) + 1  # their columns in `Textures.of_material`
-_MAX_VALUE = 6e4  # of half precision
-
-
-def texture_attributes(scene: Scene) -> dict[str, Any]:
-    """Return the attributes of a store that describe the textures of a scene's materials.
-
-    They are the texture of each material in each of `TEXTURES`, its normal map and its emission image, −1 for none, and
-    the wrap modes of each texture.
-    """
-    index = {id(texture): k for k, texture in enumerate(_textures_of(scene))}
-
-    def index_of(texture: Texture | None) -> int:
-        return -1 if texture is None else index[id(texture)]
-
-    return {
-        "textures": [[index_of(m.textures.get(name)) for name in TEXTURES] for m in scene.materials],
-        "normal_maps": [index_of(m.normal_map) for m in scene.materials],
-        "emission_images": [index_of(m.textures.get("emission")) for m in scene.materials],
-        "wraps": [[WRAPS.index(wrap) for wrap in texture.wrap] for texture in _textures_of(scene)],
-    }
-
-
-def texture_arrays(scene: Scene) -> dict[str, NDArray[Any]]:
-    """Return the textures of a scene as arrays of a store: each once, at most `MAX_TEXTURE_SIDE` wide and high.
-
-    Returns:
-        "textures/<k>", (height, width, 3) float16.
-    """
-    textures = _textures_of(scene)
-    side = _max_side(textures)
-    finest = [np.minimum(_level_pixels(texture, side), _MAX_VALUE) for texture in textures]
-    return {f"textures/{k}": pixels.astype(np.float16) for k, pixels in enumerate(finest)}
-
-
-def _textures_of(scene: Scene) -> list[Texture]:
-    """Return the textures of a scene's materials, each once."""
-    textures = (
-        texture
-        for m in scene.materials
-        for texture in (*(m.textures.get(name) for name in TEXTURES), m.normal_map, m.textures.get("emission"))
-    )
-    return list({id(texture): texture for texture in textures if texture is not None}.values())
-
-
-def _max_side(textures: Sequence[Texture]) -> int:
-    """Largest texture side for which all textures together have at most `_MAX_TEXELS`."""
-    side, pyramids = MAX_TEXTURE_SIDE, [MipMap.for_texture(texture) for texture in textures]
-    while side > 1 and sum(p.levels[_level_index(p, side)].size // 3 for p in pyramids) > _MAX_TEXELS:
-        side //= 2
-    return side
-
-
-def _level_pixels(texture: Texture, side: int) -> F32:
-    pyramid = MipMap.for_texture(texture)
-    return pyramid.level(_level_index(pyramid, side))
-
-
-def _level_index(pyramid: MipMap, side: int) -> int:
-    return next(k for k, level in enumerate(pyramid.levels) if max(level.shape[:2]) <= side)
 
 
 class Textures(NamedTuple):
@@ -139,7 +80,7 @@ def concatenate_textures(textures: Iterable[Texture], max_side: int = MAX_TEXTUR
     texels, levels, first, end = [np.empty((0, 3), np.float32)], [], [0], 0
     for texture in textures:
         pyramid = MipMap.for_texture(texture)
-        for level in map(pyramid.level, range(_level_index(pyramid, max_side), len(pyramid.levels))):
+        for level in map(pyramid.level, range(level_index(pyramid, max_side), len(pyramid.levels))):
             levels.append((end, *level.shape[:2]))
             texels.append(level.reshape(-1, 3))
             end += len(texels[-1])
@@ -235,4 +176,27 @@ def project_missing(
     faces, scale = coordinates.faces.copy(), coordinates.scale.copy()
     faces[flat] = len(coordinates.uvs) + np.arange(3 * len(flat), dtype=np.uint32).reshape(-1, 3)
     scale[flat] = 1
+    return TextureCoordinates(uvs, faces, scale)
+
+
+def transform_coordinates(
+    coordinates: TextureCoordinates,
+    face_material: Shaped[NDArray[np.integer], " faces"],
+    transforms: Sequence[UvTransform | None],
+) -> TextureCoordinates:
+    """Transform the texture coordinates of triangles.
+
+    Args:
+        coordinates: of all triangles. face_material: their materials. transforms: of each material, None for none.
+    """
+    uvs, faces, scale = coordinates
+    for material, transform in enumerate(transforms):
+        moved = np.flatnonzero(face_material == material)
+        if transform is None or not len(moved):
+            continue
+        corners, index = np.unique(faces[moved], return_inverse=True)  # other materials may share corners
+        faces, scale = faces.copy(), scale.copy()
+        faces[moved] = (len(uvs) + index.reshape(-1, 3)).astype(np.uint32)
+        scale[moved] *= np.float32(transform.side_factor)
+        uvs = np.concatenate([uvs, transform.points(uvs[corners])])
     return TextureCoordinates(uvs, faces, scale)

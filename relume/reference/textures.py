@@ -16,10 +16,13 @@ from relume.look import Look
 from relume.look.glass import glass_of, with_glass
 from relume.look.model import MeshLook
 from relume.look.object_materials import object_materials_of, with_object_materials
+from relume.look.uv_transforms import check_uv_transforms, fixed_images
+from relume.math.uv_transform import UvTransform
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
 from relume.raytrace.texture import sample_image
-from relume.scene.model import Material, Mesh, Scene
+from relume.scene.model import Material, Mesh, Scene, Texture
 from relume.scene.tangents import compute_tangents
+from relume.scene.texture_encoding import decode_rows
 
 F32 = NDArray[np.float32]
 
@@ -29,7 +32,10 @@ def with_overrides(scene: Scene, look: Look) -> Scene:
 
     Args:
         scene: any. look: the look.
+    Raises:
+        ParameterError: the look transforms texture coordinates of images that cannot be transformed.
     """
+    check_uv_transforms(look, fixed_images(scene))
     scene = with_glass(with_object_materials(scene, object_materials_of(look)), glass_of(look))
     images = {light.material: light.image for light in look.lights.values() if isinstance(light, MeshLook)}
     materials = tuple(_with_maps(material, look, images.get(material.name)) for material in scene.materials)
@@ -38,6 +44,8 @@ def with_overrides(scene: Scene, look: Look) -> Scene:
     meshes = tuple(
         _with_corners(mesh, scene.materials[mesh.material], materials[mesh.material]) for mesh in scene.meshes
     )
+    transforms = [look.materials[material.name].uv_transform for material in materials]
+    meshes = tuple(_transformed(mesh, transforms[mesh.material]) for mesh in meshes)
     return replace(scene, materials=materials, meshes=meshes)
 
 
@@ -47,6 +55,10 @@ def _with_maps(material: Material, look: Look, image: str | None) -> Material:
     if normal_map is not None:
         terms = _terms_with_roughness_map(material, look)
         material = replace(material, normal_map=load_normal_map(normal_map), terms=terms)
+    uv = look.materials[material.name].uv_transform
+    if uv is not None:
+        own = material.normal_map
+        material = replace(material, normal_map=None if own is None else _transformed_normals(own, uv))
     if image is not None:
         material = replace(material, textures={**material.textures, "emission": load_texture(image)})
     return material
@@ -57,6 +69,16 @@ def _with_corners(mesh: Mesh, own: Material, material: Material) -> Mesh:
     if material.normal_map is not own.normal_map and not mesh.tangents.any():
         return _with_tangents(_with_uvs(mesh))
     return mesh if material is own else _with_uvs(mesh)
+
+
+def _transformed(mesh: Mesh, uv: UvTransform | None) -> Mesh:
+    """Transform the texture coordinates of a mesh; its tangents stay, since anisotropy does."""
+    return mesh if uv is None else replace(mesh, uvs=uv.points(mesh.uvs))
+
+
+def _transformed_normals(normal_map: Texture, uv: UvTransform) -> Texture:
+    """Normals of a transformed map in the frame of the tangents."""
+    return Texture(np.concatenate([uv.normals(rows) for rows in decode_rows(normal_map)]), normal_map.wrap)
 
 
 def _with_tangents(mesh: Mesh) -> Mesh:

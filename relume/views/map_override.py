@@ -19,6 +19,8 @@ from relume.camera.tiling import morton
 from relume.camera.view_samples import dither_thresholds
 from relume.core.errors import StoreError
 from relume.images.image_store import load_normal_map, load_roughness_map, mean_roughness
+from relume.images.own_textures import is_own_texture
+from relume.math.uv_transform import UvTransform
 from relume.raytrace.texture import sample_image
 from relume.scene.roughness_levels import (
     levels_in_range,
@@ -41,11 +43,13 @@ class MapOverrides(NamedTuple):
         roughness: "image:<id>", None for its own map. normals: None for its own map.
         base_roughness: roughness of its terms in the scene, which normal variation increases; None if no term uses a
             map.
+        uv: transform of the coordinates of `roughness`; None: as they are.
     """
 
     roughness: str | None
     normals: NormalMap | None
     base_roughness: float | None
+    uv: UvTransform | None
 
 
 def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: RayTracer) -> View:
@@ -93,14 +97,14 @@ def _overridden_levels(
     rows, store, base_roughness = view.rows(material), view.store, override.base_roughness
     shortest = read_shortest_normals(store)[material]
     length = read_normal_length(store, view.index, rows.start, rows.stop)
-    if override.roughness is None:
-        ratio, low, high = _map_roughness(view, material)
-    else:
+    ratio, low, high = _map_roughness(view, material)
+    if override.roughness is not None:
         uv, texture = read_uv(store, view.index, rows.start, rows.stop), load_roughness_map(override.roughness)
         if uv is None:
             raise StoreError("this bake is too old for image overrides; bake the scene again")
-        base_roughness = mean_roughness(override.roughness) or None
-        ratio, (low, high) = sample_image(texture, uv)[:, 0], ratio_range(texture)
+        ratio = sample_image(texture, uv if override.uv is None else override.uv.footprints(uv))[:, 0]
+        if not is_own_texture(override.roughness):
+            base_roughness, (low, high) = mean_roughness(override.roughness) or None, ratio_range(texture)
     if perturbed_normals is not None and override.normals is not None:
         length, shortest = perturbed_normals.normal_length, min_mean_normal_length(load_normal_map(override.normals))
     grid = levels_in_range(low, high, base_roughness, shortest)

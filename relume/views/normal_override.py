@@ -86,8 +86,10 @@ def perturb_normals(
     angle = uv[:, 3:4]
     texture_axis = np.asarray(np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent), np.float32)
     texture_axis = unproject(texture_axis, normal, smooth)
-    texture = load_normal_map(map_)
-    mapped, length = mean_normal(texture, uv[:, :2], footprint_sides(uv))
+    lookups = uv if map_.uv is None else map_.uv.footprints(uv)
+    mapped, length = mean_normal(load_normal_map(map_), lookups[:, :2], footprint_sides(lookups))
+    if map_.uv is not None:
+        mapped = map_.uv.normals(mapped)
     new_normal = mapped_normal(mapped, smooth, np.column_stack([texture_axis, uv[:, 4]]), smooth)
     new_normal = flip_to_viewer(new_normal, -wo)
     new_tangent = project_to_tangent(unproject(tangent, normal, smooth), new_normal)

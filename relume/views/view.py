@@ -19,6 +19,7 @@ from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.images.image_store import load_emission_image, load_texture
+from relume.math.uv_transform import UvTransform
 from relume.patches.neighbor_filter import NeighborFilter
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.texture import sample_image
@@ -146,19 +147,20 @@ class View:
         """Roughness levels of a material's samples."""
         return RoughnessLevels(self.level_pairs[material], self.level[self.rows(material)])
 
-    def image(self, material: int, name: str) -> Shaped[F32, "n 3"]:
+    def image(self, material: int, name: str, uv: UvTransform | None = None) -> Shaped[F32, "n 3"]:
         """Look up an image of a look at a material's samples.
 
         Args:
-            material: its index. name: "image:<id>".
+            material: its index. name: "image:<id>". uv: transform of its texture coordinates; None: as they are.
         Raises:
             StoreError: the store has no texture coordinates. NotFoundError, SceneError: the image cannot be loaded.
         """
 
         def sample() -> F32:
-            return sample_image(load_texture(name), self._uv(self.rows(material)))
+            coordinates = self._uv(self.rows(material))
+            return sample_image(load_texture(name), coordinates if uv is None else uv.footprints(coordinates))
 
-        return self.cache.get_value((self.key, "image", *self.sample_key(material), name), sample)
+        return self.cache.get_value((self.key, "image", *self.sample_key(material), name, uv), sample)
 
     def _uv(self, rows: slice) -> Shaped[F32, "n uv"]:
         uv = read_uv(self.store, self.index, rows.start, rows.stop)

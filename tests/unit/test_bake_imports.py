@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-MAX_LINES = 10_000
+MAX_LINES = 10_200
 LOADED = """
 import json, sys
 from importlib import import_module

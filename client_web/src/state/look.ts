@@ -24,9 +24,14 @@ export const isBtfTerm = (term: Term): boolean => term.model === "measured_btf";
 const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>
   materialOf(name)?.is_projected === true &&
   ((normal_map ?? null) !== null || terms.some(({ texture }) => isImageReference(texture)));
-/** True if the server draws the image: a material has a BTF or a tri-planar texture, or is one of some objects. */
+/** True if the server draws the image: a material has a BTF, a tri-planar texture or transformed texture coordinates, or
+ * is one of some objects. */
 export const usesTexelShading = computed(() =>
   Object.entries(look.value?.materials ?? {}).some(
-    ([name, material]) => material.base != null || material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material),
+    ([name, material]) =>
+      material.base != null ||
+      material.uv != null ||
+      material.terms.some(isBtfTerm) ||
+      usesTriPlanarMaps(name, material),
   ),
 );

@@ -372,5 +372,7 @@ def illumination_from_look(
         return light
     materials = (look.materials[name] for name in material_names)
     return light._replace(
-        reflectances=tuple(material_reflectance(material.terms, material.normals) for material in materials)
+        reflectances=tuple(
+            material_reflectance(material.terms, material.normals, material.uv_transform) for material in materials
+        )
     )

@@ -13,6 +13,7 @@ from relume.brdf.specular import specular_albedo
 from relume.brdf.texture_slots import EmissionImage, is_user_image
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.live_term import LiveTerm
+from relume.math.uv_transform import UvTransform
 from relume.views.compose_terms import add_term
 from relume.views.pixel_blocks import num_blocks
 from relume.views.view import Tile, View
@@ -39,6 +40,7 @@ class MaterialImage:
         self._light = light
         self.terms = [LiveTerm(document, self._cos_theta_o, self._levels, light) for document in documents]
         self._emission: tuple[tuple[float, float, float], EmissionImage | None] = (0.0, 0.0, 0.0), None
+        self._uv: UvTransform | None = None
         self._emission_pattern: F32 | None = None
         self._factor: F32 | None = None
         self._max_radiance: F32 | None = None
@@ -89,6 +91,11 @@ class MaterialImage:
         del self.terms[len(documents) :]
         self.documents = list(documents)
         self._is_current = False
+
+    def set_uv(self, uv: UvTransform | None) -> None:
+        """Set the transform of texture coordinates; None for the identity."""
+        if uv != self._uv:
+            self._uv, self._is_current = uv, False
 
     def set_light(self, light: Illumination, *, is_solo: bool) -> None:
         """Set the target illumination. is_solo: it is of some sources alone."""
@@ -215,5 +222,5 @@ class MaterialImage:
         color = np.asarray(term.document["color"], np.float32)
         name = term.document.get("texture")
         if is_user_image(name):
-            return color, self._view.image(self.index, name)
+            return color, self._view.image(self.index, name, self._uv)
         return color, None if name is None else self._textures.get(name)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.lights.spherical_triangles import TriangleLights
     from relume.live.fixed_camera.illumination import Illumination, LightSource
     from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-    from relume.look import EnvironmentKey, LightGeometry
+    from relume.look import EnvironmentKey, LightGeometry, Look
     from relume.look.glass import GlassOfLook
     from relume.look.model import Link
     from relume.look.object_materials import ObjectMaterials
@@ -236,6 +236,14 @@ class OpenBake(Protocol):
 
         Raises:
             ParameterError, StoreError: see `relume.live.opened.object_material_store.ObjectMaterialStore`.
+        """
+        ...
+
+    def with_own_images(self, look: Look) -> Look:
+        """Return a look in which materials with a transform of texture coordinates name their own textures as images.
+
+        Raises:
+            ParameterError, StoreError: see `relume.live.opened.own_images.OwnImages`.
         """
         ...
 

@@ -120,6 +120,7 @@ class ViewImages:
 
         Raises what `relume.views.map_override.with_overrides` raises; then nothing has changed.
         """
+        look = self.transfer.with_own_images(look)
         maps = tuple(self._map_overrides(look, name) for name in self.transfer.material_names)
         if maps == (self.view.maps or (None,) * len(maps)):
             return self
@@ -150,9 +151,9 @@ class ViewImages:
         roughness = roughness_image(documents)
         if roughness is None and normals is None:
             return None
-        return MapOverrides(
-            roughness, normals, self._base_roughness(material) if any(map(uses_roughness_map, documents)) else None
-        )
+        base_roughness = self._base_roughness(material) if any(map(uses_roughness_map, documents)) else None
+        uv = None if roughness is None else look.materials[material].uv_transform
+        return MapOverrides(roughness, normals, base_roughness, uv)
 
     def _base_roughness(self, material: str) -> float | None:
         """Return the scene's roughness of a material's terms, which normal variation within a pixel widens."""
@@ -178,6 +179,7 @@ class ViewImages:
         Raises what `FixedViewTransfer.environment_radiance` and `LocalLightTransport.emission_image` raise; then
         nothing has changed.
         """
+        look = self.transfer.with_own_images(look)
         light, self.groups = self._lights_from_look(look, solo)
         if light != self.light:
             if light.environment.map is not None:
@@ -187,6 +189,7 @@ class ViewImages:
                 material.set_light(light, is_solo=is_solo(look, solo))
         for name, material in self.by_name.items():
             material.set_documents(material_documents(look, name))
+            material.set_uv(look.materials[name].uv_transform)
         self.gain = picture_gain(look, solo)
 
     def set_emission(self, light: Illumination) -> None:

@@ -40,6 +40,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterials, find_b
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight, TexelSource
 from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
+from relume.math.uv_transform import UvTransform
 from relume.probes.stored_scene import StoredScene, ViewedProbes
 from relume.scene.model import Camera
 from relume.transport.lobe_scene import LobeScene
@@ -107,6 +108,7 @@ class MaterialState(NamedTuple):
         previous: Self | None = None,
         normals: Sequence[NormalMap | None] | None = None,
         emission: Sequence[EmissionImage | None] | None = None,
+        uv: Sequence[UvTransform | None] | None = None,
         degrees: Sequence[int | None] | None = None,
         *,
         is_blocking: bool = True,
@@ -117,14 +119,16 @@ class MaterialState(NamedTuple):
         Args:
             terms: terms of each. previous: an earlier state, to reuse what has not changed.
             normals: normal-map overrides of each; None: none.
-            emission: emitted image of each; None: none.
+            emission: emitted image of each; None: none. uv: transform of texture coordinates of each; None: none.
             degrees: chosen degree of each, see `build_tables`; None: all are automatic.
             is_blocking: see `find_btf_materials`. traces_lobes: narrow terms are left to lobe rays.
         """
         none = [None] * len(terms)
         overrides = tuple(
-            ProbeMapOverrides(user_images(material_terms), normal_map, image)
-            for material_terms, normal_map, image in zip(terms, normals or none, emission or none, strict=True)
+            ProbeMapOverrides(user_images(material_terms), normal_map, image, transform)
+            for material_terms, normal_map, image, transform in zip(
+                terms, normals or none, emission or none, uv or none, strict=True
+            )
         )
         cached = previous.projected if previous is not None else [None] * len(terms)
         projected = [
@@ -283,8 +287,8 @@ def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -
     return (
         before.incident is after.incident
         and before.lobe_scene is after.lobe_scene
-        and [first.normals for first in before.materials.overrides]
-        == [first.normals for first in after.materials.overrides]
+        and [(first.normals, first.uv) for first in before.materials.overrides]
+        == [(first.normals, first.uv) for first in after.materials.overrides]
         and before.light._replace(reflectances=after.light.reflectances) == after.light
         and np.array_equal(before.gain, after.gain)
         and first.background == second.background

@@ -123,9 +123,9 @@ class FreeCameraPicture:
             look: the target. active_pointer: pointer to the active control, or None.
             solo: names of the only light sources to show, see `illumination_from_look`; None: all.
         Raises:
-            ParameterError: `active_pointer` does not point to an editable control, or a light is linked to an object
-                that the scene does not have. NotFoundError, SceneError: the environment is not available. The picture
-                is unchanged.
+            ParameterError: `active_pointer` does not point to an editable control, a light is linked to an object that
+                the scene does not have, or the images of a material cannot be transformed. NotFoundError,
+                SceneError: the environment is not available. The picture is unchanged.
         """
         if active_pointer is not None:
             parse_pointer(active_pointer)
@@ -133,7 +133,8 @@ class FreeCameraPicture:
         names = transfer.material_names
         images = emission_images(geometries(look), transfer.emission_image)
         transfer.check_links(links(look))
-        light = illumination_from_look(look, names, has_bounces=True, solo=solo, images=images)
+        own = transfer.with_own_images(look)
+        light = illumination_from_look(own, names, has_bounces=True, solo=solo, images=images)
         transfer.environment_map(light.environment.map)  # raises now if it is not available
         if transfer is not self._transfer:
             self._open(transfer)
@@ -174,6 +175,11 @@ class FreeCameraPicture:
     def has_object_materials(self) -> bool:
         """True if the look adds materials of objects to those of the scene."""
         return bool(self._transfer.object_materials)
+
+    @property
+    def has_uv_transforms(self) -> bool:
+        """True if the look transforms texture coordinates."""
+        return self._look is not None and any(each.uv_transform for each in self._look.materials.values())
 
     @property
     def is_corrected(self) -> bool:
@@ -454,6 +460,7 @@ class FreeCameraPicture:
                 previous,
                 normals,
                 emission,
+                [look.materials[name].uv_transform for name in names],
                 [None if count is None else degree_of(count) for count in counts],
                 is_blocking=not self._is_watched,
                 traces_lobes=traces_lobes,

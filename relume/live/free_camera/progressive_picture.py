@@ -122,11 +122,15 @@ class ProgressivePicture:
 
     def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants] | None:
         """Return what a shader needs to draw the free-camera image; None while it is corrected or the static view is
-        displayed, and for object materials, whose surfaces and probes a browser lacks.
+        displayed, for object materials, whose surfaces and probes a browser lacks, and for transformed texture
+        coordinates.
         """
         picture = self._free_camera_picture
         is_server_rendered = (
-            self._displayed is self._static_picture or picture.is_corrected or picture.has_object_materials
+            self._displayed is self._static_picture
+            or picture.is_corrected
+            or picture.has_object_materials
+            or picture.has_uv_transforms
         )
         return None if is_server_rendered else self._free_camera_picture.array_blocks()
 

@@ -10,18 +10,30 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import EmissionImage, Images, NormalMap
+from relume.math.uv_transform import UvTransform
 from relume.probes.stored_scene import StoredScene
-from relume.raytrace.surface_textures import TextureCoordinates, Textures, project_missing, replace_textures
+from relume.raytrace.surface_textures import (
+    TextureCoordinates,
+    Textures,
+    project_missing,
+    replace_textures,
+    transform_coordinates,
+)
 
 F32 = NDArray[np.float32]
 
 
 class ProbeMapOverrides(NamedTuple):
-    """Overrides of a material: of each of `TEXTURES`, the normal map, the emission image; None keeps the baked one."""
+    """Overrides of a material: of each of `TEXTURES`, the normal map, the emission image; None keeps the baked one.
+
+    Attributes:
+        uv: transform of texture coordinates; None for the identity.
+    """
 
     images: Images = (None, None)
     normals: NormalMap | None = None
     emission: EmissionImage | None = None
+    uv: UvTransform | None = None
 
     @property
     def columns(self) -> tuple[str | NormalMap | EmissionImage | None, ...]:
@@ -58,11 +70,29 @@ def overridden_textures(
         baked, positions, stored_scene.faces, stored_scene.face_normal, is_overridden[stored_scene.face_material]
     )
     textures = replace_textures(stored_scene.textures, [override.columns for override in overrides])
-    uvs, uv_faces, uv_scale = coordinates
     has_normal_map = np.array([override.normals is not None for override in overrides])
-    return OverriddenTextures(
-        textures, uvs, uv_faces, uv_scale, _tangents(stored_scene, positions, uvs[uv_faces], has_normal_map)
-    )
+    tangents = _tangents(stored_scene, positions, coordinates.uvs[coordinates.faces], has_normal_map)
+    transforms = [override.uv for override in overrides]
+    coordinates = transform_coordinates(coordinates, stored_scene.face_material, transforms)
+    return OverriddenTextures(textures, *coordinates, _transform_tangents(stored_scene, tangents, transforms))
+
+
+def _transform_tangents(stored_scene: StoredScene, tangents: F32, transforms: Sequence[UvTransform | None]) -> F32:
+    """Rotate the tangents of the corners of materials with a transform; corners of different materials differ."""
+    if not len(tangents):
+        return tangents
+    out = tangents
+    for material, transform in enumerate(transforms):
+        faces = np.flatnonzero(stored_scene.face_material == material)
+        if transform is None or not len(faces):
+            continue
+        corners, index = np.unique(stored_scene.faces[faces], return_inverse=True)
+        normals = np.zeros((len(corners), 3))
+        np.add.at(normals, index.ravel(), np.repeat(stored_scene.face_normal[faces], 3, axis=0))
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+        out = out.copy()
+        out[corners] = transform.tangents(tangents[corners], normals.astype(np.float32))
+    return out
 
 
 def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, has_normal_map: NDArray[np.bool_]) -> F32:

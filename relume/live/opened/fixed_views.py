@@ -55,10 +55,11 @@ from relume.live.opened.lobe_light import (
 )
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.object_material_store import ObjectMaterialStore
+from relume.live.opened.own_images import OwnImages
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, complete, validate
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, Look, complete, validate
 from relume.look.glass import GlassOfLook, glass_of
 from relume.look.object_materials import ObjectMaterials
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
@@ -166,6 +167,15 @@ class BakedFixedViews:
     def local(self) -> LocalLights:
         """Local lights of the scene."""
         return LocalLights(self.store, self.cache, self.key)
+
+    @cached_property
+    def own_images(self) -> OwnImages:
+        """The scene's textures as images of looks."""
+        return OwnImages(self.key, self.store)
+
+    def with_own_images(self, look: Look) -> Look:
+        """Name the scene's own textures in materials with a transform. See `FixedViewTransfer`."""
+        return self.own_images.look(look)
 
     @cached_property
     def tracer(self) -> NormalRetracer:

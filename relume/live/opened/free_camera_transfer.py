@@ -31,7 +31,7 @@ from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.prefiltered_environments import PrefilteredEnvironments
 from relume.live.opened.stored_patches import read_patches
 from relume.live.opened.sun_extraction import SunExtractor
-from relume.look import EnvironmentKey, LightGeometry
+from relume.look import EnvironmentKey, LightGeometry, Look
 from relume.look.glass import GlassOfLook
 from relume.look.model import Link
 from relume.look.object_materials import ObjectMaterials
@@ -116,6 +116,10 @@ class BakedFreeCamera:
             return self
         light_transport = self.light_transport.with_object_materials(materials)
         return replace(self, light_transport=light_transport, stored_scene=read_stored_scene(light_transport.store))
+
+    def with_own_images(self, look: Look) -> Look:
+        """Name the scene's own textures in materials with a transform. See `OpenBake`."""
+        return self.light_transport.with_own_images(look)
 
     @property
     def cache(self) -> Cache:

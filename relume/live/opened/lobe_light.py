@@ -25,6 +25,7 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.retrace import NormalRetracer
+from relume.math.uv_transform import UvTransform
 from relume.methods.patch_layout import read_tree
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
@@ -36,6 +37,7 @@ from relume.raytrace.surface_textures import (
     read_textures,
     replace_textures,
     texture_coordinates,
+    transform_coordinates,
 )
 from relume.store.bake_protocol import StoreReader
 from relume.transport.hit_textures import NO_TEXTURES, HitTextures, hit_textures, row_of_slot, textured_light
@@ -57,8 +59,16 @@ _BLUR = 1.5  # of the environment behind a second lobe, by the median of its hal
 _PREVIEW_RAYS, _NARROW_RAYS, _LOBE_RAYS = 34, 144, 233  # of a sample, Fibonacci numbers
 
 
-HitImages = tuple[tuple[MapName | None, ...], ...]
-"""Images of a look that replace textures of each material, as columns of `Textures.material_textures`."""
+class HitImages(NamedTuple):
+    """Images of a look that lobe rays meet.
+
+    Attributes:
+        names: images that replace textures of each material, as columns of `Textures.material_textures`.
+        transforms: of the texture coordinates of each material, None for none; empty for none at all.
+    """
+
+    names: tuple[tuple[MapName | None, ...], ...]
+    transforms: tuple[UvTransform | None, ...] = ()
 
 
 def hit_images(
@@ -70,7 +80,8 @@ def hit_images(
         reflectances: of all materials, or empty. materials: their names. emission: emitted image of each, by name.
     """
     images = [each.images for each in reflectances] or [(None, None)] * len(materials)
-    return tuple((*image, None, emission.get(name)) for image, name in zip(images, materials, strict=True))
+    names = tuple((*image, None, emission.get(name)) for image, name in zip(images, materials, strict=True))
+    return HitImages(names, tuple(each.uv for each in reflectances))
 
 
 class LobePatches(NamedTuple):
@@ -175,17 +186,18 @@ class LobeTracer:
         if self._textures is None:
             return NO_TEXTURES
         baked, coordinates = self._textures
-        textures, geometry = replace_textures(baked, images), self._tracer.geometry
+        textures, geometry = replace_textures(baked, images.names), self._tracer.geometry
         has_texture = np.asarray((textures.material_textures[:, : len(TEXTURES)] >= 0).any(axis=1))
         mesh_args = geometry.positions, geometry.faces, geometry.face_normals, has_texture[geometry.face_material]
-        return hit_textures(textures, project_missing(coordinates, *mesh_args))
+        coordinates = project_missing(coordinates, *mesh_args)
+        return hit_textures(textures, transform_coordinates(coordinates, geometry.face_material, images.transforms))
 
     @cached_property
     def _textures(self) -> tuple[Textures, TextureCoordinates] | None:
         """Textures as baked, and their coordinates; None for a store without them."""
         geometry = self._tracer.geometry
         try:
-            textures, uvs = read_textures(self._store), self._store.read("scene/uvs")
+            uvs, textures = self._store.read("scene/uvs"), read_textures(self._store)
         except ChunkDamagedError:
             raise
         except StoreError:

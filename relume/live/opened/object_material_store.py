@@ -37,6 +37,7 @@ _BY_MATERIAL = (  # attributes with an entry for each material
     "textures",
     "normal_maps",
     "emission_images",
+    "roughness_maps",
     "gather_rays",
 )
 _PROBE_TRANSFER = ("sh/cluster", "sh/weight")  # with a row for each probe, like "probes/…"

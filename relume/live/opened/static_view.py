@@ -30,6 +30,7 @@ from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.lobe_light import LobeTracer
 from relume.live.opened.local_lights import LocalLights
+from relume.live.opened.own_images import OwnImages
 from relume.live.opened.samples import SelectedSamples
 from relume.look.glass import GlassOfLook, with_glass
 from relume.look.object_materials import ObjectMaterials, with_object_materials
@@ -67,6 +68,11 @@ class _OverBake:
     def local(self) -> LocalLights:
         """Local lights of the scene."""
         return self.light_transport.local
+
+    @cached_property
+    def own_images(self) -> OwnImages:
+        """The scene's textures as images of looks."""
+        return self.light_transport.own_images
 
     @cached_property
     def lobe_tracer(self) -> LobeTracer:

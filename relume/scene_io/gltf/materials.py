@@ -9,6 +9,7 @@ import numpy as np
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, quote, unsupported
+from relume.math.uv_transform import UvTransform
 from relume.scene_io.gltf.document import GltfMaterial as GltfMaterial
 from relume.scene_io.gltf.document import TextureInfo
 from relume.scene_io.gltf.images import ImageReader
@@ -20,7 +21,6 @@ from relume.scene_io.surfaces.material_textures import TextureLayout
 from relume.scene_io.surfaces.surface_images import ImageInput
 from relume.scene_io.surfaces.surface_inputs import Color, Rgb, Scalar
 from relume.scene_io.surfaces.surface_parameters import SurfaceParameters
-from relume.scene_io.surfaces.uv_transforms import UvTransform
 
 _TRANSFORM = "KHR_texture_transform"
 

@@ -13,6 +13,7 @@ from relume.core.color import luminance
 from relume.core.errors import SceneError
 from relume.core.import_warnings import UNREADABLE, ImporterWarning, approximated, ignored, quote, unsupported
 from relume.image_io.decode import U8, Decoder
+from relume.math.uv_transform import UvTransform
 from relume.scene.model import Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 from relume.scene.unique_names import unique_name
@@ -28,7 +29,7 @@ from relume.scene_io.obj_ply.mtl_dialects import (
 )
 from relume.scene_io.referenced_files import Companions
 from relume.scene_io.surfaces.texture_resampling import NOISE
-from relume.scene_io.surfaces.uv_transforms import UvSlot, UvTransform, UvTransforms
+from relume.scene_io.surfaces.uv_transforms import UvSlot, UvTransforms
 
 F64 = NDArray[np.float64]
 MAX_STRENGTH = 100.0

@@ -14,8 +14,9 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, unsupported, with_subject
 from relume.image_io.decode import MAX_SIDE, Decoder
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
+from relume.math.uv_transform import UvTransform
 from relume.scene.texture_encoding import SRGB_TO_LINEAR
-from relume.scene_io.surfaces.uv_transforms import UvSet, UvTransform
+from relume.scene_io.surfaces.uv_transforms import UvSet
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]

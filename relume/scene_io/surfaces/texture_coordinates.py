@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.scene_io.surfaces.uv_transforms import UvSet, UvTransform
+from relume.math.uv_transform import UvTransform
+from relume.scene_io.surfaces.uv_transforms import UvSet
 
 F64 = NDArray[np.float64]
 Pair = tuple[float, float]

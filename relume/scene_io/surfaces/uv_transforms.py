@@ -11,6 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.math.uv_transform import UvTransform
 from relume.scene.model import F32
 
 U8 = NDArray[np.uint8]
@@ -20,15 +21,6 @@ Tiling = tuple[tuple[int, int], tuple[float, float]]
 _NO_TILING: Tiling = ((1, 1), (0.0, 0.0))
 _MAX_TILED = 8192  # texels per side
 _MAX_REPEAT_ERROR = 1e-4
-
-
-@dataclass(frozen=True)
-class UvTransform:
-    """Scale, rotation (radians, counterclockwise with v down) and translation of UV coordinates, as in glTF."""
-
-    offset: tuple[float, float] = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: tuple[float, float] = (1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -46,12 +38,8 @@ class UvSlot:
         """
         if not sets:
             return np.zeros((num_vertices, 2), np.float32)
-        p = self.transform
-        c, s = np.cos(p.rotation), np.sin(p.rotation)
-        rotation = np.array([[c, s], [-s, c]])
         coordinates = sets.get(self.uv_set, sets[min(sets)])
-        transformed = (coordinates * np.array(p.scale)) @ rotation.T + np.array(p.offset)
-        return np.asarray(np.clip(transformed, -1e6, 1e6), np.float32)
+        return np.clip(self.transform.points(coordinates), np.float32(-1e6), np.float32(1e6))
 
 
 class UvTransforms:

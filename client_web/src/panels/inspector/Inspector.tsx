@@ -6,6 +6,7 @@ import { BaseColorImage } from "./images/BaseColorImage";
 import { EmissionImage } from "./images/EmissionImage";
 import { MetalnessImage } from "./images/MetalnessImage";
 import { NormalImage } from "./images/NormalImage";
+import { UvControls } from "./images/UvControls";
 import { openLibrary } from "../library/libraryItems";
 import { LightInspector } from "./lights/LightInspector";
 import { openLight } from "../lights/lightEdits";
@@ -208,6 +209,7 @@ function MaterialInspector() {
           {materialLook.base == null && <EmissionImage material={material} />}
         </Section>
       )}
+      {!isShadowCatcher && materialLook !== undefined && <UvControls material={material} materialLook={materialLook} />}
       {materialLook !== undefined && <ObjectMaterials name={material} material={materialLook} />}
     </div>
   );

@@ -49,8 +49,8 @@ def _is_similar(before: Illumination, after: Illumination) -> bool:
     return (
         equal_up_to_reflectances(before, after)
         and before.paths == after.paths
-        and [(each.images, each.normals) for each in before.reflectances]
-        == [(each.images, each.normals) for each in after.reflectances]
+        and [(each.images, each.normals, each.uv) for each in before.reflectances]
+        == [(each.images, each.normals, each.uv) for each in after.reflectances]
         and max_albedo_change(before.reflectances, after.reflectances) <= _MAX_ALBEDO_CHANGE
     )
 

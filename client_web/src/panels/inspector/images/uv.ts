@@ -1,0 +1,20 @@
+/** The transform of a material's texture coordinates. */
+import type { UvLook } from "../../../look.gen";
+import type { MaterialLook } from "../../../protocol";
+
+export type UvTransform = Required<UvLook>;
+
+export const IDENTITY: UvTransform = { scale: [1, 1], rotation: 0, offset: [0, 0] };
+
+/** The transform of a material; the identity without one. */
+export function uvOf(material: MaterialLook): UvTransform {
+  return { ...IDENTITY, ...material.uv };
+}
+
+/** The material with a changed transform; without the field for the identity, as the server has it. */
+export function withUv(material: MaterialLook, change: Partial<UvTransform>): MaterialLook {
+  const { uv: _before, ...rest } = material;
+  const uv = { ...uvOf(material), ...change };
+  const isIdentity = [...uv.scale, uv.rotation, ...uv.offset].join() === "1,1,0,0,0";
+  return isIdentity ? rest : { ...rest, uv };
+}
