@@ -417,6 +417,7 @@ class MaterialLook(TypedDict):
     terms: NotRequired[Sequence[TermLook]]
     shadow_catcher: NotRequired[bool]
     normal_map: NotRequired[NormalMapLook | None]
+    uv: NotRequired[UvLook | None]
     glass: NotRequired[GlassLook | None]
     basis_functions: NotRequired[Literal[1, 3, 6, 10, 15, 21, 28, 36] | None]
     base: NotRequired[str | None]
@@ -955,6 +956,15 @@ class Turntable(TypedDict):
     start_camera: NotRequired[CameraFrame | None]
     pivot: NotRequired[Sequence[float] | None]
     rotate: NotRequired[Literal["camera", "object", "environment"]]
+
+
+class UvLook(TypedDict):
+    """Transform of a material's texture coordinates: `scale`, then `rotation` in degrees, then `offset`, as in glTF's
+    KHR_texture_transform. See `relume.math.uv_transform`."""
+
+    scale: NotRequired[Sequence[float]]
+    rotation: NotRequired[float]
+    offset: NotRequired[Sequence[float]]
 
 
 class ViewInfo(TypedDict):
