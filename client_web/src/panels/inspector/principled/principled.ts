@@ -39,7 +39,7 @@ export async function readMaterial(name: string, material: MaterialLook): Promis
     terms: terms,
     glass: glass === undefined || glass === null ? null : { ...glass },
     scene: scene.peek()?.id ?? null,
-    material: name,
+    material: material.base ?? name,
   });
   store(name, material, reading);
   return reading;
