@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
-MOVED_S = 30.0
+MOVED_S = 90.0
 MENU_PX = 310  # beside the camera's menu
 
 
