@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import Reflectance, material_reflectance, scatters_diffusely
-from relume.brdf.texture_slots import NormalMap
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.look import validate
 from relume.look.document import MAX_BOUNCES
@@ -48,8 +47,8 @@ def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[
 def ignore_glossy_reflection() -> Iterator[None]:
     """Restrict relume's indirect light to diffuse terms, for peers with the same restriction."""
 
-    def reflectance_of_diffuse_terms(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None) -> Reflectance:
-        return material_reflectance(list(filter(scatters_diffusely, terms)), normals)
+    def reflectance_of_diffuse_terms(terms: Sequence[Mapping[str, Any]], *of_textures: Any) -> Reflectance:
+        return material_reflectance(list(filter(scatters_diffusely, terms)), *of_textures)
 
     with patch("relume.live.fixed_camera.illumination.material_reflectance", reflectance_of_diffuse_terms):
         yield
