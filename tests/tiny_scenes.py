@@ -157,10 +157,10 @@ def still_life():
     return make_scene("still life", meshes, materials, cameras, Environment("studio", studio()))
 
 
-def make_tiny_scene(*meshes, camera, environment=None, materials=None) -> Scene:
+def make_tiny_scene(*meshes, camera, environment=None, materials=None, lights=()) -> Scene:
     """A scene of some meshes and one camera; by default with white Lambert materials."""
     if materials is None:
         count = 1 + max(m.material for m in meshes)
         materials = [Material(f"M{k}", ({"model": "lambert", "color": [1, 1, 1]},)) for k in range(count)]
     radiance = np.ones((4, 8, 3), np.float32) if environment is None else environment
-    return make_scene("tiny", meshes, materials, [camera], Environment("environment", radiance))
+    return make_scene("tiny", meshes, materials, [camera], Environment("environment", radiance), lights=lights)

@@ -56,12 +56,12 @@ def measure(tiny: bool) -> list[Figure]:
         figures = []
         for name, noise in (("solve.error", 0.0), ("solve.error_noisy", _NOISE)):
             noisy = picture * (1.0 + noise * rng.standard_normal(picture.shape))
-            with_lights, with_materials = (
+            lights_alone, with_materials = (
                 _error(start, render, noisy.astype(np.float32), small, Path(folder), materials)
                 for materials in (frozenset[str](), _MATERIALS)
             )
-            lights_alone = {**context, "noise": noise, "materials": sorted(_MATERIALS), "lights_alone": with_lights}
-            figures.append(Figure(name, with_materials, "relative RMS", lights_alone))
+            errors = {"noise": noise, "materials": sorted(_MATERIALS), "lights_alone": lights_alone}
+            figures.append(Figure(name, with_materials, "relative RMS", context | errors))
         sources = load_sources(start, render)
     return [*figures, Figure("solve.ms", _stroke_ms(sources), "ms", context)]
 

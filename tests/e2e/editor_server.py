@@ -89,9 +89,9 @@ class Server:
             camera=make_camera("front", [0, 0.8, -3.2], [0, 0.5, 0], 0.75),
             environment=studio(),
             materials=[Material("Panel", (clay,), double_sided=False), Material("Floor", (clay,))],
+            lights=[Light("Panel", {"kind": "mesh", "material": "Panel", "emission": [2.0, 4.0, 8.0]})],
         )
-        light = Light("Panel", {"kind": "mesh", "material": "Panel", "emission": [2.0, 4.0, 8.0]})
-        return self._registered(type(scene)(**{**vars(scene), "lights": (light,)}))
+        return self._registered(scene)
 
     def _registered(self, scene: Scene) -> str:
         """Register a scene and bake it by few probes."""

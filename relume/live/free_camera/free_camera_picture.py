@@ -172,18 +172,15 @@ class FreeCameraPicture:
         return picture
 
     @property
-    def has_object_materials(self) -> bool:
-        """True if the look adds materials of objects to those of the scene."""
-        return bool(self._transfer.object_materials)
-
-    @property
-    def has_uv_transforms(self) -> bool:
-        """True if the look transforms texture coordinates."""
-        return self._look is not None and any(each.uv_transform for each in self._look.materials.values())
+    def exceeds_browser(self) -> bool:
+        """True for what the browser's renderer does not have: a residual, object materials, whose surfaces and probes
+        it lacks, and transformed texture coordinates."""
+        has_transforms = self._look is not None and any(each.uv_transform for each in self._look.materials.values())
+        return self.is_corrected or bool(self._transfer.object_materials) or has_transforms
 
     @property
     def is_corrected(self) -> bool:
-        """True if a residual is added, which the browser's renderer does not have."""
+        """True if a residual is added."""
         return self._residual_image is not None
 
     @property

@@ -121,17 +121,10 @@ class ProgressivePicture:
         self._free_camera_picture.renders_pixels = draws
 
     def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants] | None:
-        """Return what a shader needs to draw the free-camera image; None while it is corrected or the static view is
-        displayed, for object materials, whose surfaces and probes a browser lacks, and for transformed texture
-        coordinates.
+        """Return what a shader needs to draw the free-camera image; None while the static view is displayed or the
+        image exceeds the browser's renderer.
         """
-        picture = self._free_camera_picture
-        is_server_rendered = (
-            self._displayed is self._static_picture
-            or picture.is_corrected
-            or picture.has_object_materials
-            or picture.has_uv_transforms
-        )
+        is_server_rendered = self._displayed is self._static_picture or self._free_camera_picture.exceeds_browser
         return None if is_server_rendered else self._free_camera_picture.array_blocks()
 
     def prepare(self, pointer: str) -> None:
