@@ -122,16 +122,23 @@ class PatchLight:
         return np.asarray(point_values.reshape(len(rows), -1, 3).mean(axis=1), np.float32)
 
     def irradiance(
-        self, lights: TriangleLights, light_indices: Shaped[NDArray[np.intp], " M"] | None = None
+        self,
+        lights: TriangleLights,
+        light_indices: Shaped[NDArray[np.intp], " M"] | None = None,
+        *,
+        is_preview: bool = False,
     ) -> Shaped[F32, "patches 3"]:
         """Return the direct irradiance of each patch, averaged over its points.
 
         Args:
             lights: triangles of the environment. light_indices: their indices in the bake; None: all.
+            is_preview: only at the first points; gather rays average over many patches.
         """
-        visible = self._select_visible(self.visible.reshape(-1, self.visible.shape[2]), light_indices)
-        point_irradiance = irradiance(self.points.normal, visible, lights).reshape(*self.visible.shape[:2], 3)
-        return np.asarray(point_irradiance.mean(axis=1, dtype=np.float64), np.float32)
+        num_points = 1 if is_preview else self.points_per_patch
+        points = self.first_points(np.arange(self.num_patches)) if is_preview else self.points
+        bits = np.ascontiguousarray(self.visible[:, :num_points]).reshape(-1, self.visible.shape[2])
+        point_irradiance = irradiance(points.normal, self._select_visible(bits, light_indices), lights)
+        return np.asarray(point_irradiance.reshape(-1, num_points, 3).mean(axis=1, dtype=np.float64), np.float32)
 
     def visibility_bits(
         self, rows: Shaped[NDArray[np.intp], " G"], light_indices: Shaped[NDArray[np.intp], " M"] | None = None

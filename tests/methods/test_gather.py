@@ -401,7 +401,7 @@ def test_bounces_are_counted_from_direct_light(gathered, direct):
 
 def test_the_displayed_paths_can_change_in_a_session(gathered, monkeypatch):
     """From indirect light alone, previewed before other light is ready, to all light."""
-    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 300)
     picture = Picture(gathered, "front", Cache(BUDGET))
     for show in ("first_bounce", "all", "direct"):
 
@@ -434,7 +434,7 @@ def test_a_downsampled_bake_has_the_same_light(gathered, monkeypatch):
 
 
 def test_a_rotation_is_previewed_with_its_indirect_light(gathered, monkeypatch):
-    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 300)
     picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
 
     def turn(document):

@@ -124,7 +124,7 @@ class BakedIndirectViews(BakedFixedViews):
 
     def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
         """Return the exact outgoing light of patches."""
-        return self.indirect.outgoing_light(light, is_canceled) if light.paths.has_indirect else no_light()
+        return self.indirect.outgoing_light(light, is_canceled=is_canceled) if light.paths.has_indirect else no_light()
 
     def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
         """Return the textures and reflectances of patches, for lobe rays."""
@@ -153,7 +153,7 @@ class BakedIndirectViews(BakedFixedViews):
             return ()
         # in a preview, tracing overridden normals takes too long
         reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
-        return (replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled)),)
+        return (replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, quality, is_canceled)),)
 
     def _mirror_rays(self, samples: Samples, light: Illumination, followed: Collection[int]) -> tuple[RayList, ...]:
         """Return the rays from virtual lights in planar mirrors, but not in those that lobe rays follow."""

@@ -73,7 +73,7 @@ _PREVIEW = _Approximation(False, False, Directions.BINNED)
 _PREVIEW_FOR_RAYS = _Approximation(False, True, Directions.BINNED)
 _EXACT_CHANGE = _Approximation(True, True, Directions.BINNED)
 _CHANGE_OF_SURFACES = _Approximation(True, False, Directions.BINNED)
-_CHANGE_OF_LIGHTS = _Approximation(False, False, Directions.NONE)
+_ISOTROPIC = _Approximation(False, False, Directions.NONE)
 
 
 class IndirectSolver:
@@ -144,19 +144,33 @@ class IndirectSolver:
         elif equal_up_to_reflectances(start_from, light):
             approximation = _CHANGE_OF_SURFACES
         else:
-            approximation = _CHANGE_OF_LIGHTS
+            approximation = _ISOTROPIC
         before, after = (self._solve(_indirect_only(each), approximation, is_canceled) for each in (start_from, light))
         virtual_lights = None if self._mirror_light is None else self._mirror_light.virtual_lights(light, start_from)
         return IndirectSolution(after.patches, after.outgoing.subtract(before.outgoing), virtual_lights)
 
-    def outgoing_light(self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False) -> OutgoingLight:
-        """Return the exact solution, tabulated for gather rays and cached. See `solve_indirect`."""
-        indirect = _indirect_only(light)
+    def outgoing_light(
+        self,
+        light: Illumination,
+        quality: LightQuality = LightQuality.EXACT,
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> OutgoingLight:
+        """Return the solution from scratch, tabulated for gather rays and cached.
+
+        A preview is isotropic after the first reflection, which takes a sixth of the time: few of its samples show the
+        difference.
+
+        Args:
+            light: the illumination. quality: of the solution. is_canceled: polled, see `solve_indirect`.
+        """
+        indirect, is_preview = _indirect_only(light), quality is LightQuality.PREVIEW
+        approximation, cache = (_ISOTROPIC, self._cache.transient) if is_preview else (_EXACT, self._cache)
 
         def solve() -> OutgoingLight:
-            return self.solve_indirect(light, LightQuality.EXACT, is_canceled=is_canceled).along_rays()
+            return self._solve(indirect, approximation, is_canceled).along_rays()
 
-        return self._cache.get_value((self._key, "indirect light", indirect, self._has_mirror_light(indirect)), solve)
+        key = self._key, "indirect light", is_preview, indirect, self._has_mirror_light(indirect)
+        return cache.get_value(key, solve)
 
     def _has_mirror_light(self, light: Illumination) -> bool:
         return self._mirror_light is not None and self._mirror_light.is_in(light)

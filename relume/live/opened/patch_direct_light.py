@@ -189,9 +189,9 @@ class DirectPatchLight:
     def _preview_irradiance(self, environment: EnvironmentKey) -> F32:
         lights, harmonic = self._find_lights(environment, LightQuality.PREVIEW), self._harmonic
         if harmonic is None:
-            return self.patches.irradiance(lights)
+            return self.patches.irradiance(lights, is_preview=True)
         split = harmonic.frequency_split(lights)
-        residual = self.patches.irradiance(split.residual, split.residual_triangles)
+        residual = self.patches.irradiance(split.residual, split.residual_triangles, is_preview=True)
         return residual + harmonic.irradiance @ split.low_frequency
 
     def _coefficients(

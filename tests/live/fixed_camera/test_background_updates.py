@@ -36,7 +36,7 @@ def opened(request):
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
     """Previews of few samples, like those of large images."""
-    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 300)
 
 
 def lit_by(maps, number, *, light_position=None, sigma=None, **environment):

@@ -23,7 +23,7 @@ def large(monkeypatch):
     for name, value in {
         "strategies.shade._MIN_HIDDEN_SAMPLES": 0,
         "strategies.sparse_preview._MAX_SHADED_AT_ONCE": 0,
-        "strategies.sparse_preview._MAX_SHADED": 40,
+        "strategies.sparse_preview._NUM_SHADED": 40,
     }.items():
         monkeypatch.setattr(f"relume.live.fixed_camera.{name}", value)
     monkeypatch.setattr("relume.operators.shade._MIN_ROWS_PER_STEP", 16)
@@ -99,7 +99,7 @@ def test_interrupted_shading_resumes(transfer, monkeypatch):
 
 
 def test_a_large_picture_is_refined_progressively(transfer, monkeypatch):
-    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 4)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 4)
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MIN_FINER_RATIO", 1)
     picture, images = opened(transfer, None), []
     while not picture.advance(None).exact:

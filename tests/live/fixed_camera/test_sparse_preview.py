@@ -31,7 +31,7 @@ def make(picture, need):
 @pytest.fixture
 def few(monkeypatch):
     """As few samples as for a picture of 200 × 150."""
-    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 600)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 600)
 
 
 @pytest.mark.usefixtures("few")

@@ -29,13 +29,13 @@ from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look.model import Rgb
 from relume.operators.shade import ShadedTerm, shade
 from relume.operators.texel_light import collect_light, fits_budget, indirect_texel_light
-from relume.views.pixel_blocks import nearest_chosen, one_per_block
+from relume.views.pixel_blocks import block_sizes, nearest_chosen, one_per_block
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
 
-_MAX_SHADED = 6000  # approximate number of samples in a view
-_MAX_SHADED_AT_ONCE = 8 * _MAX_SHADED  # samples of terms in a view that take as long as selecting a subset
+_NUM_SHADED = 8000  # approximate number of samples in a view
+_MAX_SHADED_AT_ONCE = 6 * _NUM_SHADED  # samples of terms in a view that take as long as selecting a subset
 _DETAIL_FACTOR = 8  # ratio of samples between levels of detail
 _MIN_FINER_RATIO = 16  # times the samples of a finer preview; with fewer, all are shaded
 _NUM_NEIGHBORS = 3
@@ -63,7 +63,7 @@ class SampleSubset:
 def choose_samples(
     transfer: FixedViewTransfer, view: View, material: int, detail: int, *, has_indirect: bool
 ) -> SampleSubset:
-    """Select one sample per pixel block of a material; reads the store.
+    """Select one sample per pixel block of a material, of smaller blocks where it bends; reads the store.
 
     The others are averages of the nearest selected samples, by image position and normal.
 
@@ -71,7 +71,7 @@ def choose_samples(
         transfer: an open bake. view: one of its views. material: index of the material.
         detail: number of refinements. has_indirect: they are shaded with indirect light.
     """
-    step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _num_shaded(detail)))))
+    step = int(block_sizes(view, _num_shaded(detail))[material])
     sample_indices = one_per_block(view, material, step)
     neighbors, weight = nearest_chosen(view, material, sample_indices, step, _NUM_NEIGHBORS, _SOFTENING)
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(sample_indices))
@@ -82,7 +82,7 @@ def choose_samples(
 
 
 def _num_shaded(detail: int) -> int:
-    return _MAX_SHADED * int(_DETAIL_FACTOR**detail)
+    return _NUM_SHADED * int(_DETAIL_FACTOR**detail)
 
 
 def _sample_subset(images: ViewImages, material: int, light: Illumination, detail: int) -> SampleSubset:
