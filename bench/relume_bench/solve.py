@@ -43,9 +43,9 @@ _NUM_TIMED = 20
 
 def measure(tiny: bool) -> list[Figure]:
     """Errors of the picture without and with noise, and the median time of a stroke's solution."""
-    rng, num_lights, size = np.random.default_rng(0), 1 if tiny else 20, (32, 24) if tiny else (640, 480)
+    rng, num_lights, size = np.random.default_rng(0), 4 if tiny else 20, (64, 48) if tiny else (640, 480)
     with tempfile.TemporaryDirectory() as folder:
-        transfer = _bake(Path(folder), size, 64 if tiny else None)
+        transfer = _bake(Path(folder), size)
 
         def render(look: Look) -> F32:
             return render_small(transfer, _VIEW, look, _WIDTH)
@@ -66,8 +66,8 @@ def measure(tiny: bool) -> list[Figure]:
     return [*figures, Figure("solve.ms", _stroke_ms(sources), "ms", context)]
 
 
-def _bake(folder: Path, size: tuple[int, int], num_patches: int | None) -> FixedViewTransfer:
-    recipe = Recipe("gather", (_VIEW,), size, 20, num_patches=num_patches)
+def _bake(folder: Path, size: tuple[int, int]) -> FixedViewTransfer:
+    recipe = Recipe("gather", (_VIEW,), size, 20)
     return open_transfer(
         bake_in_process(METHODS["gather"], cornell_box(is_floor_glossy=True), recipe, folder / "gather.zarr"),
         Cache(4 << 30),
