@@ -109,7 +109,7 @@ def test_solo_pictures_sum_to_the_whole(transfer):
     np.testing.assert_allclose(total, whole, rtol=ADDED * UNIT)
 
 
-NUM_STEPS, A_STEP = 60, 32  # of the drag, and coefficients of each
+NUM_STEPS, A_STEP = 200, 32  # of the drag, and coefficients of each
 
 
 def test_highlight_dragged_to_both_ends_and_back_leaves_no_trace(transfer):
