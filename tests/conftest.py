@@ -20,6 +20,7 @@ __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
 os.environ.setdefault("RELUME_BATCH_NICE", "0")  # tests that run in parallel would wait too long for renders
 os.environ.setdefault("RELUME_PREWARM", "false")  # no process after each bake
+os.environ.setdefault("RELUME_PRELOAD_IMPORTER", "false")  # nor one of each server, before it imports anything
 
 # examples are deterministic and have no deadline: machines differ in speed and load
 settings.register_profile("relume", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])

@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from importlib.metadata import version
 
 import uvicorn
-from fastapi import Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 
 from relume.core.memory_usage import limit_malloc_arenas
 from relume.image_io.ocio.active_config import get_config, using_config
@@ -104,7 +104,11 @@ ROUTE_GROUPS = (
     login,
     health,
 )
-
+# Included once: for each app, FastAPI would build the models of all parameters again, a quarter of a second.
+ROUTES = APIRouter(responses=errors.OPENAPI_RESPONSES, generate_unique_id_function=lambda route: route.name)
+for _group in ROUTE_GROUPS:
+    _takes_any = _group in (session, health)  # a session's address is checked by the session
+    ROUTES.include_router(_group.router, dependencies=[] if _takes_any else [Depends(check_query)])
 
 PING_INTERVAL_S = 5.0
 """Interval of pings: of participants whose network is gone, others learn in this time plus the timeout."""
@@ -148,8 +152,6 @@ def create_app(
         docs_url=None,  # the documentation pages load scripts from other sites
         redoc_url=None,
         lifespan=lifespan,
-        responses=errors.OPENAPI_RESPONSES,
-        generate_unique_id_function=lambda route: route.name,
     )
     openapi.install(app)
     app.state.drain = drain
@@ -180,9 +182,7 @@ def create_app(
     )
     app.add_middleware(RootPath, root_path=settings.root_path, identity=lambda: app.state.services.access.identity)
     app.add_middleware(RequestIds)
-    for group in ROUTE_GROUPS:
-        takes_any = group in (session, health)  # a session's address is checked by the session
-        app.include_router(group.router, dependencies=[] if takes_any else [Depends(check_query)])
+    app.router.routes.extend(ROUTES.routes)
     app.router.default = client.Client(settings.client)  # not a mount, which would hide 405 responses
     return app
 

@@ -25,7 +25,7 @@ IN_PROCESS = [
     "rays", "bake", "store_size", "paper_fig5", "accuracy_terms", "accuracy_generated", "pca",
     "preview", "curve_switch_terms", "shade",
     "estimators", "sharp_slider", "mesh_files",
-    "factorization", "factorization_measured", "factorization_pictures", "large", "cryptomatte_file", "solve",
+    "factorization", "factorization_measured", "factorization_pictures", "large", "cryptomatte_file",
 ]  # fmt: skip
 LONG = [
     "workers", "plan", "session", "demo", "canvas", "peer_mitsuba", "reference",
@@ -37,7 +37,7 @@ LONG = [
     "free_camera_exact", "rotation", "btf_several", "btf_moving", "plan_disk", "probes_live", "probes_error", "assets",
     "export_round_trip", "export_blender", "light_groups", "lens",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
-    "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits",
+    "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits", "solve",
 ]  # fmt: skip
 # figures from random points or a noisy renderer have a standard error
 ESTIMATES = (

@@ -10,6 +10,7 @@ import OpenImageIO
 import pytest
 import trimesh
 from fastapi.testclient import TestClient
+from server_fakes import InThreadSteps
 from session_client import Frame, open_session
 from tiny_scenes import still_life
 
@@ -25,8 +26,9 @@ WIDTH, HEIGHT = 80, 60
 
 @pytest.fixture(scope="module")
 def real_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    data = tmp_path_factory.mktemp("data")
-    with TestClient(create_app(Settings(data=data, allowed_hosts=["testserver"]))) as client:
+    """The app with its real library; renders run in this process, not in worker processes that would have to start."""
+    settings = Settings(data=tmp_path_factory.mktemp("data"), allowed_hosts=["testserver"])
+    with TestClient(create_app(settings, open_steps=InThreadSteps)) as client:
         yield client
 
 

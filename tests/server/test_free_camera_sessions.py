@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from fastapi.testclient import TestClient
+from server_fakes import InThreadSteps
 from session_client import Frame, Session, open_session
 from test_end_to_end import decode_rgb9e5, rendered_by, wait_until_done
 
@@ -24,7 +25,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is not a slow link
         settings = Settings(data=tmp_path_factory.mktemp("moving"), allowed_hosts=["testserver"])
-        with TestClient(create_app(settings)) as client:
+        with TestClient(create_app(settings, open_steps=InThreadSteps)) as client:
             yield client
 
 

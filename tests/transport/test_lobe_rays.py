@@ -90,15 +90,15 @@ def brute_force(term_document, normal, wo, radiance_along):
     t = any_tangent(normal[:1])[0].astype(float)
     frame = np.stack([t, np.cross(n, t), n])
     local_o = frame @ o
-    theta = np.sinh(np.linspace(0, np.arcsinh(np.pi / 2 / 1e-5), 6001)) * 1e-5
+    theta = np.sinh(np.linspace(0, np.arcsinh(np.pi / 2 / 1e-5), 2001)) * 1e-5
     middle, width = 0.5 * (theta[1:] + theta[:-1]), np.diff(theta)
-    phi = (np.arange(720) + 0.5) * (2 * np.pi / 720)
+    phi = (np.arange(360) + 0.5) * (2 * np.pi / 360)
     h = np.stack(np.broadcast_arrays(
         np.sin(middle)[:, None] * np.cos(phi), np.sin(middle)[:, None] * np.sin(phi), np.cos(middle)[:, None]
     ), -1)  # fmt: skip
     cos_d = h @ local_o
     i = 2 * cos_d[..., None] * h - local_o
-    weight = (np.sin(middle) * width)[:, None] * (2 * np.pi / 720) * 4 * np.maximum(cos_d, 0) * np.maximum(i[..., 2], 0)
+    weight = (np.sin(middle) * width)[:, None] * (2 * np.pi / 360) * 4 * np.maximum(cos_d, 0) * np.maximum(i[..., 2], 0)
     value = term.quotients(*np.moveaxis(i, -1, 0), *local_o)[0] * weight
     for curve in term.curves:
         if not curve.depends_on_view:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -47,11 +47,13 @@ def _is_excepted(finding: Finding) -> bool:
     return any(line.startswith(start) for start in EXCEPTIONS)
 
 
-def _findings(folder: str) -> Iterator[Finding]:
-    for finding in read([ROOT / folder]):
-        named = finding._replace(location=str(Path(finding.location).relative_to(ROOT)))
-        if not _is_excepted(named):
-            yield named
+@functools.cache
+def _findings(folder: str) -> tuple[Finding, ...]:
+    """Read a folder once for both tests of its words."""
+    named = (
+        finding._replace(location=str(Path(finding.location).relative_to(ROOT))) for finding in read([ROOT / folder])
+    )
+    return tuple(finding for finding in named if not _is_excepted(finding))
 
 
 @pytest.mark.parametrize("path", SPOKEN)

@@ -128,6 +128,11 @@ def test_bake_resumes_from_the_ledger_after_all_processes_are_killed(
     assert not set(repeated) & {f"{stage}.{index}" for stage, index in done}
 
 
+@pytest.mark.parametrize(
+    "ledger_url",
+    [pytest.param("sqlite", marks=pytest.mark.slow), "postgresql"],  # test_service has two services on SQLite
+    indirect=True,
+)
 def test_two_processes_bake_one_recipe_once(tmp_path: Path, ledger_url: str, expected: str) -> None:
     log = tmp_path / "log"
     processes = [start(tmp_path / "data", ledger_url, delay_s=0.02, log=str(log)) for _ in range(2)]

@@ -189,9 +189,8 @@ def test_materials_and_lights_follow_twice(moving: tuple[Editor, list[int]]) -> 
     assert np.abs(here - there).mean() < 1
 
 
-@pytest.mark.parametrize(
-    "model", [pytest.param("blinn_phong", marks=pytest.mark.slow), "ggx"]
-)  # one that the in-basis tells, and one that is a lobe alone
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["blinn_phong", "ggx"])  # one that the in-basis tells, and one that is a lobe alone
 def test_highlights_are_where_the_server_has_them(moving: tuple[Editor, list[int]], model: str) -> None:
     editor, _ = moving
     page = editor.page

@@ -186,6 +186,7 @@ def test_points_that_are_touched_change_nothing_and_a_nudge_no_more_than_its_sha
         assert curve.shown() == places
 
 
+@pytest.mark.slow
 def test_all_tools_change_what_they_touch_and_a_reload_keeps_the_points(curve: CurvePage) -> None:
     page, params = curve.page, {"sigma": 0.05, "ior": 1.8}
     plain = bands_of(term_of("cook_torrance", params))

@@ -148,7 +148,10 @@ def drag(editor: Editor, it: Draggable, sign: int) -> None:
 
 
 # ways of the same kinds of controls
-LONG = {"brightness", "rotation", "light", "drawing", "stretch", "material map", "handle of a light"}
+LONG = {
+    "brightness", "roughness", "rotation", "light", "curve point", "drawing", "stretch", "material map",
+    "handle of a light",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in DRAGGABLES])

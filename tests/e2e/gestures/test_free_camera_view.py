@@ -163,6 +163,7 @@ def test_a_material_is_selected_by_a_click_and_edited_after_the_camera_moved(mov
     differs(moving, edited)
 
 
+@pytest.mark.slow
 def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server, moving_scene: str) -> None:
     page, first = moving.page, moving.read_pixels()
     page.get_by_role("button", name="Options ▾").click()

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from editor_page import WAIT_MS, Editor, changed
 from editor_server import SIZE, Server
 from PIL import Image
@@ -185,6 +186,7 @@ def test_a_reload_returns_to_the_same_place_and_undo_goes_on_before_it(editor: E
     assert editor.slider(SIGMA).get_attribute("aria-valuenow") == value
 
 
+@pytest.mark.slow
 def test_a_lost_server_is_said_and_edits_catch_up(editor: Editor, server: Server) -> None:
     editor.choose("Ball", 1)
     before = editor.pixels()

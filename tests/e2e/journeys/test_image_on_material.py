@@ -72,6 +72,7 @@ def test_an_image_named_like_a_map_of_roughness_and_metal_becomes_both(editor: E
     editor.wait_until_exact()
 
 
+@pytest.mark.slow
 def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> None:
     """By a button, a list, a drop and keys; taken off and undone, all twice; a reload brings it back."""
     page = editor.page

@@ -14,6 +14,7 @@ def add_light(page: Page, kind: str) -> None:
     expect(page.locator(".light.selected .name", has_text=kind)).to_be_focused()
 
 
+@pytest.mark.slow
 def test_the_focus_passes_a_handle_and_enter_takes_it(editor: Editor) -> None:
     """A selected light deselects the material; deleting it focuses the other."""
     page = editor.page
