@@ -64,7 +64,10 @@ def match_lights(
         raise ParameterError("locked", min(unknown), f"pointers of enabled lights: {names_text(sources.pointers)}")
     is_free = np.array([pointer not in locked for pointer in sources.pointers])
     equations = NormalEquations.from_target(sources, painted.target)
-    strengths = solve_strengths(sources, equations, is_free, changes_color=changes_color, ridge=ridge)
+    keeps_balance = all(region.kind != "reference" for region in painted.regions)
+    strengths = solve_strengths(
+        sources, equations, is_free, changes_color=changes_color, keeps_balance=keeps_balance, ridge=ridge
+    )
     image, radiance, marked = sources.image(strengths), painted.target.radiance, painted.marked
     before = sources.image(sources.strengths) if before is None else before
     changes = strength_changes(sources, strengths, changes_color=changes_color)

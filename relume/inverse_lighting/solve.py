@@ -6,10 +6,15 @@ For each channel c, minimize over the strengths x of the free sources
 
 with the images A of the sources, the constant b, the target t, the weights w, W = Σ_p w_p, the mean square n² of each
 image and the current strengths x⁰. The ridge λ leaves sources where they are as far as the target does not decide.
+
+Strokes keep the balance of the lights. Their ridge is that of relative changes, λ W E Σ_s (x_s/x⁰_s − 1)² with the
+energy E = Σ_s n_s² x⁰_s², and each source moves only to the side on which it comes nearer to the target by itself:
+none is turned off to make up for another one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +30,12 @@ from relume.look.light_validation import MAX_INTENSITY
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-RIDGE = 1e-4
+SolveSystem = Callable[[F64, F64, F64, F64, tuple[F64, F64], NDArray[np.bool_]], F64]
+RIDGE = 1e-3
 _RELATIVE_ROUNDING = 1e-12
+_ROUNDING = 1e-4  # of sums over the pixels of images, relative
+_DIM = 0.2
+"""RMS of a source, relative to √E, below which changes count relative to this: lights at 0 can be turned up, too."""
 MAX_RADIANCE = 1e9
 _LEAST_WEIGHT = np.float32(1e-4)
 
@@ -112,6 +121,7 @@ def solve_strengths(
     is_free: Shaped[NDArray[np.bool_], " sources"],
     *,
     changes_color: bool,
+    keeps_balance: bool,
     ridge: float = RIDGE,
 ) -> Shaped[F64, "sources 3"]:
     """Return the strengths that solve the normal equations.
@@ -120,19 +130,20 @@ def solve_strengths(
         sources: the sources. equations: of the target.
         is_free: false for sources that stay. A source stays, too, where its image is black.
         changes_color: whether channels change separately; otherwise intensities alone, with the current colors.
-        ridge: λ.
+        keeps_balance: as for strokes; see above. ridge: λ.
     """
+    solve = _solve_balanced if keeps_balance else _solve_system
     if changes_color:
-        return _solve_channels(sources, equations, is_free, ridge)
-    return _solve_intensities(sources, equations, is_free, ridge)
+        return _solve_channels(sources, equations, is_free, ridge, solve)
+    return _solve_intensities(sources, equations, is_free, ridge, solve)
 
 
 def _solve_channels(
-    sources: Sources, equations: NormalEquations, is_free: NDArray[np.bool_], ridge: float
+    sources: Sources, equations: NormalEquations, is_free: NDArray[np.bool_], ridge: float, solve: SolveSystem
 ) -> Shaped[F64, "sources 3"]:
     limits = MAX_INTENSITY * sources.color_scales[:, 0]
     columns = [
-        _solve_system(gram, rhs, ridge * scale, current, limits, is_free)
+        solve(gram, rhs, ridge * scale, current, (np.zeros_like(limits), limits), is_free)
         for gram, rhs, scale, current in zip(
             equations.gram, equations.rhs, equations.ridge, sources.strengths.T, strict=True
         )
@@ -141,22 +152,41 @@ def _solve_channels(
 
 
 def _solve_intensities(
-    sources: Sources, equations: NormalEquations, is_free: NDArray[np.bool_], ridge: float
+    sources: Sources, equations: NormalEquations, is_free: NDArray[np.bool_], ridge: float, solve: SolveSystem
 ) -> Shaped[F64, "sources 3"]:
     """Solve for the intensities, which joins the systems of the channels."""
     colors = sources.colors
     gram = np.einsum("sc,cst,tc->st", colors, equations.gram, colors)
     rhs = np.einsum("sc,cs->s", colors, equations.rhs)
     scale = np.einsum("sc,cs->s", np.square(colors), equations.ridge)
-    limits = np.full(len(colors), MAX_INTENSITY)
-    return _solve_system(gram, rhs, ridge * scale, sources.intensities, limits, is_free)[:, None] * colors
+    limits = np.zeros(len(colors)), np.full(len(colors), MAX_INTENSITY)
+    return solve(gram, rhs, ridge * scale, sources.intensities, limits, is_free)[:, None] * colors
+
+
+def _solve_balanced(
+    gram: F64, rhs: F64, ridge: F64, current: F64, limits: tuple[F64, F64], is_free: NDArray[np.bool_]
+) -> Shaped[F64, " sources"]:
+    """Solve the system with a ridge of relative changes, and each variable on one side of its current value."""
+    squares = ridge * np.square(current)
+    energy = squares.sum()
+    relative = ridge * energy / np.maximum(squares, _DIM**2 * energy) if energy > 0.0 else ridge
+    sides = _signs(rhs, gram @ current)
+    lower, upper = np.where(sides > 0.0, current, limits[0]), np.where(sides < 0.0, current, limits[1])
+    return _solve_system(gram, rhs, relative, current, (lower, upper), is_free & (sides != 0.0))
+
+
+def _signs(wanted: F64, current: F64) -> F64:
+    """Signs of the differences; 0 within rounding."""
+    difference = wanted - current
+    return np.where(np.abs(difference) > _ROUNDING * np.maximum(wanted, current), np.sign(difference), 0.0)
 
 
 def _solve_system(
-    gram: F64, rhs: F64, ridge: F64, current: F64, limits: F64, is_free: NDArray[np.bool_]
+    gram: F64, rhs: F64, ridge: F64, current: F64, limits: tuple[F64, F64], is_free: NDArray[np.bool_]
 ) -> Shaped[F64, " sources"]:
-    """Minimize xᵀGx − 2gᵀx + Σ ridge (x − current)² over the free variables in [0, limit]."""
-    free = np.flatnonzero(is_free & (ridge > 0.0))
+    """Minimize xᵀGx − 2gᵀx + Σ ridge (x − current)² over the free variables within limits."""
+    lower, upper = limits
+    free = np.flatnonzero(is_free & (ridge > 0.0) & (lower < upper))
     strengths = current.copy()
     if not len(free) or not gram.any():
         return strengths
@@ -167,5 +197,6 @@ def _solve_system(
     system *= scale[:, None] * scale
     factor = cholesky(system + _RELATIVE_ROUNDING * np.eye(len(free)))
     reduced = solve_triangular(factor, wanted * scale, trans="T")
-    strengths[free] = lsq_linear(factor, reduced, (0.0, limits[free] / scale), method="bvls").x * scale
+    bounds = lower[free] / scale, upper[free] / scale
+    strengths[free] = lsq_linear(factor, reduced, bounds, method="bvls").x * scale
     return strengths
