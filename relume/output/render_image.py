@@ -111,7 +111,11 @@ def render_small(
 def small_size(
     transfer: OpenBake, view_name: str, width: int, camera_and_size: tuple[Camera, tuple[int, int]] | None = None
 ) -> tuple[int, int]:
-    """Return the width and height of the image that `render_small` renders with the same arguments."""
+    """Return the width and height of the image of `render_small`, without rendering it.
+
+    Args:
+        transfer, view_name, width, camera_and_size: as for `render_small`.
+    """
     view = transfer.views[view_name]
     large_width, large_height = (view.width, view.height) if camera_and_size is None else camera_and_size[1]
     step = max(1, large_width // width)
