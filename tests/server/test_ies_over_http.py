@@ -60,8 +60,8 @@ def test_a_broken_file_is_rejected_with_the_reason(client):
 def test_a_file_that_a_light_of_a_scene_uses_stays_until_the_scene_is_deleted(client):
     data = ies_text(cosine_web(1, POLAR, scale=100), POLAR).encode()
     profile = IES_FILES.name_of(data)
-    lamp = Light("Lamp", {"kind": "point", "position": [0.0, 1.0, 0.0], "profile": profile})
-    scene = replace(tiny_scene(), name="Gallery", lights=(lamp,), ies_files=(IesFile("Lamp", data),))
+    light = Light("Lamp", {"kind": "point", "position": [0.0, 1.0, 0.0], "profile": profile})
+    scene = replace(tiny_scene(), name="Gallery", lights=(light,), ies_files=(IesFile("Lamp", data),))
     bakes, url = client.app.state.services.bakes, f"{URL}/{profile.removeprefix('ies:')}"
     identity = register_scene(bakes.data_dir, bakes.ledger, scene)
     problem = parse_problem(client.delete(url))
