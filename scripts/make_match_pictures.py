@@ -24,7 +24,6 @@ from PIL import Image, ImageDraw
 from relume import look as looks
 from relume.image_io.display_transform import DisplayTransform, to_display
 from relume.image_io.write_image import png_bytes, to_bytes
-from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume_cli.main import main as relume
 from relume_server.api.solve import solve_request
 from relume_server.runtime.library import open_library
@@ -46,7 +45,7 @@ class Example:
 
     def __init__(self, store: Path, look: dict[str, Any], output: Path) -> None:
         self._library = open_library(CACHE_BYTES, 0)
-        self._transfer: FixedViewTransfer = self._library.open_transfer(store)
+        self._transfer = self._library.open_transfer(store)
         self._bake, self._output = store.name.split(".")[0], output
         self.look = look
 

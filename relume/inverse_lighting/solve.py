@@ -171,7 +171,7 @@ def _solve_intensities(
     limits = np.full(len(colors), MAX_INTENSITY)
     system = _System(gram, rhs, ridge * scale, sources.intensities, 0.0 * limits, limits)
     if keeps_balance:
-        system = system.balanced(equations.rises.any(axis=0), equations.falls.any(axis=0))
+        system = system.balanced(np.any(equations.rises, axis=0), np.any(equations.falls, axis=0))
     return system.solve(is_free)[:, None] * colors
 
 
