@@ -93,7 +93,7 @@ def _error(look: Look, render: RenderLook, target: F32, picture: F32, folder: Pa
     """Match a look to a target of full size, and compare its small image with that of the picture."""
     write_image(folder / "target.exr", target)
     request = MatchRequest(reference=(folder / "target.exr").read_bytes(), materials=materials)
-    match = match_look(look, render, request)
+    match = match_look(look, render, (picture.shape[1], picture.shape[0]), request)
     after = Look.model_validate(merge_changes(look.model_dump(mode="json"), match.operations))
     return float(np.linalg.norm(render(after)[..., :3] - picture) / np.linalg.norm(picture))
 

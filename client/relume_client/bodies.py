@@ -737,6 +737,7 @@ class SceneMaterial(TypedDict):
     shadow_catcher: bool
     is_projected: bool
     is_glass: bool
+    is_textured: bool
     objects: Sequence[str]
 
 

@@ -1097,13 +1097,14 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. `objects`: names of its objects; empty as those of the scene. */
+/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks edit its glass, but cannot make other materials transmit. `is_textured`: it has an image of the scene's file. `objects`: names of its objects; empty as those of the scene. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
   shadow_catcher: boolean;
   is_projected: boolean;
   is_glass: boolean;
+  is_textured: boolean;
   objects: string[];
 }
 

@@ -15,6 +15,7 @@ const material = (name: string, is_projected: boolean) => ({
   terms: [],
   shadow_catcher: false,
   is_glass: false,
+  is_textured: false,
   objects: [],
 });
 

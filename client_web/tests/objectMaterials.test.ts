@@ -20,6 +20,7 @@ const sceneMaterial = (name: string, objects: string[]) => ({
   shadow_catcher: false,
   is_projected: false,
   is_glass: false,
+  is_textured: false,
   objects,
 });
 

@@ -12,8 +12,6 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
-from relume.core.errors import ParameterError
-from relume.core.validation import names_text
 from relume.inverse_lighting.painting import PaintedTarget
 from relume.inverse_lighting.report import Shortfall, residual, shortfalls
 from relume.inverse_lighting.solve import RIDGE, NormalEquations, solve_strengths
@@ -54,17 +52,18 @@ def match_lights(
     """Find the intensities and colors of lights with which the image is nearest to a target.
 
     Args:
-        sources: the sources. painted: the target. locked: JSON pointers of sources that stay.
+        sources: the sources. painted: the target. locked: pointers of sources that stay.
         changes_color: colors change, too. ridge: see `relume.inverse_lighting.solve`.
         before: current image, if the sources are those of a look with other changes.
     Raises:
-        ParameterError: a pointer in `locked` is no source. ShapeMismatchError: the target has another size.
+        ShapeMismatchError: the target has another size.
     """
-    if unknown := set(locked) - set(sources.pointers):
-        raise ParameterError("locked", min(unknown), f"pointers of enabled lights: {names_text(sources.pointers)}")
     is_free = np.array([pointer not in locked for pointer in sources.pointers])
     equations = NormalEquations.from_target(sources, painted.target)
-    strengths = solve_strengths(sources, equations, is_free, changes_color=changes_color, ridge=ridge)
+    keeps_balance = all(region.kind != "reference" for region in painted.regions)
+    strengths = solve_strengths(
+        sources, equations, is_free, changes_color=changes_color, keeps_balance=keeps_balance, ridge=ridge
+    )
     image, radiance, marked = sources.image(strengths), painted.target.radiance, painted.marked
     before = sources.image(sources.strengths) if before is None else before
     changes = strength_changes(sources, strengths, changes_color=changes_color)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from relume.inverse_lighting.rotation import best_rotation
 from relume.inverse_lighting.solve import RIDGE, Target, average_blocks
 from relume.inverse_lighting.sources import (
     ENVIRONMENT_POINTER,
+    LOCKED_POINTER,
     RenderLook,
     Sources,
     load_sources,
-    look_without_lights,
     pointer_of,
     replace_operations,
 )
@@ -70,38 +71,40 @@ class LookMatch:
     match: Match
 
 
-def match_look(look: Look, render: RenderLook, request: MatchRequest) -> LookMatch:
+def match_look(look: Look, render: RenderLook, size: Size, request: MatchRequest) -> LookMatch:
     """Find the lights, and the materials by request, with which the image of a look is nearest to a target.
 
     Args:
-        look: the current look. render: renders small images of looks; all have the same size. request: the target.
+        look: the current look. render: renders small images of looks. size: width and height of these images.
+        request: the target.
     Raises:
         EditError: the look's image is not linear in its lights. SceneError: the reference picture cannot be read.
         ParameterError: the request does not fit the look.
     """
     reference = None
     if request.reference is not None:
-        reference = read_reference(request.reference, look.display, _size(render(look_without_lights(look))))
+        reference = read_reference(request.reference, look.display, size)
         reference, render = reference.averaged(_REFERENCE_BLOCK), _averaged(render, reference.weights)
-    sources = load_sources(look, render)
+    load = partial(load_sources, render=render, locked=request.locked)
+    sources = load(look)
     before = sources.image(sources.strengths)
     painted = _painted(before, request, reference)
     ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
 
     def match(sources: Sources) -> Match:
         return match_lights(
-            sources, painted, request.locked, changes_color=request.changes_color, ridge=ridge, before=before
+            sources, painted, {LOCKED_POINTER}, changes_color=request.changes_color, ridge=ridge, before=before
         )
 
     def error(rotation: float) -> float:
-        return match(load_sources(_rotated(look, rotation), render)).error
+        return match(load(_rotated(look, rotation))).error
 
     after = look
     if request.rotates and ENVIRONMENT_POINTER not in request.locked and painted.marked.any():
         after = _rotated(look, best_rotation(error, look.environment.rotation))
     if request.materials and painted.marked.any():
-        after = match_materials(after, request.materials, render, painted.target, match, ridge)
-    return _look_match(look, after, match(load_sources(after, render)))
+        after = match_materials(after, request.materials, render, load, painted.target, match, ridge)
+    return _look_match(look, after, match(load(after)))
 
 
 def _averaged(render: RenderLook, weights: F32) -> RenderLook:

@@ -28,7 +28,7 @@ from relume.inverse_lighting.material_parameters import (
     with_positions,
 )
 from relume.inverse_lighting.solve import Target, valid_target
-from relume.inverse_lighting.sources import RenderLook, Sources, load_sources, merge_changes, replace_operations
+from relume.inverse_lighting.sources import RenderLook, Sources, merge_changes, replace_operations
 from relume.look import Look
 
 F64 = NDArray[np.float64]
@@ -38,23 +38,30 @@ _DIFFERENCE = 0.02  # of a position: above the rounding of indirect light, which
 _TOLERANCE = 1e-3  # of positions, and of the error relative to itself
 _GRADIENT_TOLERANCE = 1e-6  # of the squared relative error: pictures without noise are never reached exactly
 _CHANGED = 1e-3  # least change of a position that counts
+LoadSources = Callable[[Look], Sources]
 MatchSources = Callable[[Sources], Match]
 
 
 def match_materials(
-    look: Look, names: Collection[str], render: RenderLook, target: Target, match: MatchSources, ridge: float
+    look: Look,
+    names: Collection[str],
+    render: RenderLook,
+    load: LoadSources,
+    target: Target,
+    match: MatchSources,
+    ridge: float,
 ) -> Look:
     """Return the look with the materials that come nearest to a target together with its lights, which stay here.
 
     Args:
-        look: the look. names: materials that may change. render: renders a look. target: the target.
-        match: solves for the lights. ridge: λ.
+        look: the look. names: materials that may change. render: renders a look. load: loads its sources.
+        target: the target. match: solves for the lights. ridge: λ.
     Raises:
         ParameterError: as `material_parameters`.
     """
     parameters = material_parameters(look, names)
     start = positions_of(look, parameters)
-    problem = _Problem(look, parameters, start, render, target, match, ridge)
+    problem = _Problem(look, parameters, start, render, load, target, match, ridge)
     solution = least_squares(
         problem.residuals,
         start,
@@ -78,15 +85,16 @@ class _Problem:
         parameters: tuple[MaterialParameter, ...],
         start: F64,
         render: RenderLook,
+        load: LoadSources,
         target: Target,
         match: MatchSources,
         ridge: float,
     ) -> None:
         self._at = partial(with_positions, look, parameters)
-        self._start, self._render, self._match, self._ridge = start, render, match, ridge
+        self._start, self._render, self._load_look, self._match, self._ridge = start, render, load, match, ridge
         self._radiance, weights = valid_target(target)
         self._scales = np.sqrt(weights)[..., None] / (np.linalg.norm(np.sqrt(weights)[..., None] * self._radiance) or 1)
-        self._positions, self._sources = start, load_sources(look, render)
+        self._positions, self._sources = start, load(look)
 
     def residuals(self, positions: F64) -> Shaped[F64, " residuals"]:
         """Return the residuals of pixels, and those of the ridge."""
@@ -110,7 +118,7 @@ class _Problem:
 
     def _load(self, positions: F64) -> Sources:
         if not np.array_equal(positions, self._positions):
-            self._positions, self._sources = positions.copy(), load_sources(self._at(positions), self._render)
+            self._positions, self._sources = positions.copy(), self._load_look(self._at(positions))
         return self._sources
 
     def _image(self, positions: F64, match: Match) -> NDArray[np.float32]:

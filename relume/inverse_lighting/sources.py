@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,8 @@ from jaxtyping import Shaped
 from jsonpointer import JsonPointer
 from numpy.typing import NDArray
 
-from relume.core.errors import EditError
+from relume.core.errors import EditError, ParameterError
+from relume.core.validation import names_text
 from relume.look import LightLook, Look
 from relume.look.light_validation import MAX_INTENSITY
 from relume.look.model import EnvironmentLook
@@ -22,6 +23,8 @@ F64 = NDArray[np.float64]
 RenderLook = Callable[[Look], Shaped[F32, "height width channels"]]
 
 ENVIRONMENT_POINTER = "/environment"
+LOCKED_POINTER = "/locked"
+"""Pointer of the source of all locked lights together, which no look has."""
 _UNIT_STRENGTH = {"intensity": 1.0, "color": (1.0, 1.0, 1.0)}
 _DISPLAY_FIELDS = {"display"}
 _NUM_COLORS = 3
@@ -33,8 +36,9 @@ class Sources:
     """Light sources of a look, with strength s = intensity · color per channel; image = Σ strength · image + constant.
 
     Attributes:
-        pointers: JSON pointers of the enabled lights and of the environment in the look. images: linear radiance of
-            each at strength 1, by channel. constant: radiance of no light, such as a background color.
+        pointers: JSON pointers of the enabled lights and of the environment in the look, or `LOCKED_POINTER`.
+        images: linear radiance of each at strength 1, by channel. constant: radiance of no light, such as a
+            background color.
         intensities, colors: current ones.
     """
 
@@ -78,26 +82,36 @@ def pointer_of(section: str, name: str) -> str:
     return str(JsonPointer.from_parts([section, name]).path)
 
 
-def load_sources(look: Look, render: RenderLook) -> Sources:
+def load_sources(look: Look, render: RenderLook, locked: Collection[str] = ()) -> Sources:
     """Render the images of a look's sources.
 
     Args:
         look: the look. render: renders a look; called once for each source, with a look that depends on no other.
+        locked: pointers of lights that stay; together they are one source of strength 1.
     Raises:
         EditError: the look has a shadow catcher, whose ratio is not linear in the lights.
+        ParameterError: a pointer in `locked` is no source.
     """
     if any(material.shadow_catcher for material in look.materials.values()):
         raise EditError("lights cannot be matched with a shadow catcher; turn it off while you match")
     lights, dark = source_lights(look), _dark_look(look)
-    images = [render(_single_source_look(dark, pointer, light)) for pointer, light in lights.items()]
+    if unknown := set(locked) - set(lights):
+        raise ParameterError("locked", min(unknown), f"pointers of enabled lights: {names_text(lights)}")
+    free = {pointer: light for pointer, light in lights.items() if pointer not in locked}
+    images = [render(_single_source_look(dark, pointer, light)) for pointer, light in free.items()]
+    strengths = [(pointer, light.intensity, light.color) for pointer, light in free.items()]
+    if locked:
+        images.append(render(_with_lights(dark, {pointer: lights[pointer] for pointer in lights if pointer in locked})))
+        strengths.append((LOCKED_POINTER, 1.0, (1.0, 1.0, 1.0)))
+    pointers, intensities, colors = zip(*strengths, strict=True)
     has_constant = look.background.kind == "color"
     constant = render(look_without_lights(look)) if has_constant else np.zeros_like(images[0])
     return Sources(
-        tuple(lights),
+        pointers,
         np.ascontiguousarray(np.moveaxis(np.stack(images)[..., :_NUM_COLORS], -1, 0), np.float32),
         np.ascontiguousarray(constant[..., :_NUM_COLORS], np.float32),
-        np.array([light.intensity for light in lights.values()], np.float64),
-        np.array([light.color for light in lights.values()], np.float64),
+        np.array(intensities, np.float64),
+        np.array(colors, np.float64),
     )
 
 
@@ -117,10 +131,14 @@ def _dark_look(look: Look) -> Look:
 
 
 def _single_source_look(dark: Look, pointer: str, light: LightLook | EnvironmentLook) -> Look:
-    unit = light.model_copy(update=_UNIT_STRENGTH)
-    if pointer == ENVIRONMENT_POINTER:
-        return dark.model_copy(update={"environment": unit})
-    return dark.model_copy(update={"lights": {JsonPointer(pointer).parts[1]: unit}})
+    return _with_lights(dark, {pointer: light.model_copy(update=_UNIT_STRENGTH)})
+
+
+def _with_lights(dark: Look, sources: Mapping[str, LightLook | EnvironmentLook]) -> Look:
+    """Return a dark look with sources."""
+    environment = sources.get(ENVIRONMENT_POINTER, dark.environment)
+    lights = {JsonPointer(each).parts[1]: light for each, light in sources.items() if each != ENVIRONMENT_POINTER}
+    return dark.model_copy(update={"environment": environment, "lights": lights})
 
 
 def strength_changes(

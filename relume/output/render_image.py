@@ -19,6 +19,7 @@ from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import Look
 from relume.look.glass import glass_of
 from relume.scene.model import Camera
+from relume.views.downsampled import downsampled_size
 
 
 def render_image(
@@ -98,14 +99,29 @@ def render_small(
     """
     view = transfer.views[view_name]
     if isinstance(transfer, BakedFreeCamera):
-        camera, (large_width, height) = camera_and_size or (view.camera, (view.width, view.height))
-        step = max(1, large_width // width)
-        small_size = large_width // step, max(1, height // step)
-        return _render_free_camera(transfer, view_name, look, (camera, small_size)).image()
+        camera = view.camera if camera_and_size is None else camera_and_size[0]
+        size = small_size(transfer, view_name, width, camera_and_size)
+        return _render_free_camera(transfer, view_name, look, (camera, size)).image()
     step = max(1, view.width // width)
     return render_image(
         transfer if step < 2 else cast("FixedViewTransfer", transfer).downsampled(view_name, step), view_name, look
     )
+
+
+def small_size(
+    transfer: OpenBake, view_name: str, width: int, camera_and_size: tuple[Camera, tuple[int, int]] | None = None
+) -> tuple[int, int]:
+    """Return the width and height of the image of `render_small`, without rendering it.
+
+    Args:
+        transfer, view_name, width, camera_and_size: as for `render_small`.
+    """
+    view = transfer.views[view_name]
+    large_width, large_height = (view.width, view.height) if camera_and_size is None else camera_and_size[1]
+    step = max(1, large_width // width)
+    if isinstance(transfer, BakedFreeCamera):
+        return large_width // step, max(1, large_height // step)
+    return downsampled_size((large_width, large_height), step)
 
 
 def _render_free_camera(

@@ -14,6 +14,16 @@ from numpy.typing import NDArray
 from relume.store.bake_protocol import StoreReader
 
 
+def downsampled_size(size: tuple[int, int], step: int) -> tuple[int, int]:
+    """Return the width and height of every `step`-th pixel of an image of a size."""
+    width, height = (-(-(side - _first(side, step)) // step) for side in size)
+    return width, height
+
+
+def _first(side: int, step: int) -> int:
+    return min(step // 2, side - 1)
+
+
 class DownsampledStore:
     """Another store's samples of one view, without the omitted pixels."""
 
@@ -21,9 +31,9 @@ class DownsampledStore:
         width, height = store.attributes["size"]
         y, x = np.divmod(store.read(f"views/{view}/pixel"), width)
         self._store, self._prefix = store, f"views/{view}/"
-        left, top = (min(step // 2, side - 1) for side in (width, height))
+        left, top = _first(width, step), _first(height, step)
         self._sample_rows = np.flatnonzero((x % step == left) & (y % step == top))
-        columns, rows = -(-(width - left) // step), -(-(height - top) // step)
+        columns, rows = downsampled_size((width, height), step)
         self._pixel: NDArray[np.uint32] = (y // step * columns + x // step)[self._sample_rows].astype(np.uint32)
         self._attributes = {**store.attributes, "size": [columns, rows]}
 

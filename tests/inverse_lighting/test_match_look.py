@@ -10,16 +10,17 @@ from matched_looks import matched, relative_error
 from PIL import Image
 from session_edits import make_look
 
-from relume.core.errors import EditError, SceneError
+from relume.core.errors import EditError, ParameterError, SceneError
 from relume.image_io.display_transform import DisplayTransform, to_display
 from relume.image_io.tone_mapping import tone_map
 from relume.image_io.write_image import png_bytes, to_bytes, write_image
 from relume.inverse_lighting.match_look import MatchRequest, match_look
 from relume.inverse_lighting.painting import Stroke
 from relume.inverse_lighting.reference_picture import read_reference
-from relume.inverse_lighting.sources import load_sources
-from relume.output.render_image import render_image, render_small
+from relume.inverse_lighting.sources import LOCKED_POINTER, load_sources
+from relume.output.render_image import render_image, render_small, small_size
 
+SIZE = 40, 30
 LIGHTS = {
     "Key/1": {"kind": "point", "position": [0.5, 1.3, 0.5], "emission": [2.0, 1.5, 1.0]},
     "Fill": {
@@ -69,7 +70,7 @@ def test_images_of_sources_sum_to_the_image(gathered, render, background):
 @pytest.mark.parametrize("background", ["map", "color"])
 def test_the_lights_of_a_picture_come_back(gathered, render, tmp_path, background):
     look, wanted = look_of(gathered, background=background), look_of(gathered, background=background, **WANTED)
-    result = match_look(look, render, MatchRequest(reference=exr_bytes(render(wanted), tmp_path)))
+    result = match_look(look, render, SIZE, MatchRequest(reference=exr_bytes(render(wanted), tmp_path)))
     after = matched(look, result)
     assert relative_error(render(after), render(wanted)) < 0.01
     assert result.match.residual < 0.01
@@ -77,6 +78,39 @@ def test_the_lights_of_a_picture_come_back(gathered, render, tmp_path, backgroun
     np.testing.assert_allclose(after.lights["Key/1"].color, [1.0, 0.5, 0.25], rtol=0.02)
     assert after.lights["Fill"].intensity == pytest.approx(0.4, rel=0.05)
     assert after.lights["Off"] == look.lights["Off"]
+
+
+def test_locked_lights_are_one_image(gathered, render):
+    look, rendered = look_of(gathered, **WANTED), []
+
+    def counted(each):
+        rendered.append(each)
+        return render(each)
+
+    sources = load_sources(look, counted, {"/environment", "/lights/Fill"})
+    assert (sources.pointers, len(rendered)) == (("/lights/Key~11", LOCKED_POINTER), 2)
+    assert relative_error(sources.image(sources.strengths), render(look)) < 1e-4
+    everything = load_sources(look, render, {"/environment", "/lights/Key~11", "/lights/Fill"})
+    assert everything.pointers == (LOCKED_POINTER,)
+    assert relative_error(everything.image(everything.strengths), render(look)) < 1e-4
+
+
+def test_an_unknown_lock_is_an_error(gathered, render):
+    with pytest.raises(ParameterError, match="/lights/Fill"):
+        load_sources(look_of(gathered), render, {"/lights/Off"})
+
+
+def test_a_reference_renders_nothing_but_the_lights(gathered, render, tmp_path):
+    look, rendered = look_of(gathered), []
+
+    def counted(each):
+        rendered.append(each)
+        return render(each)
+
+    data = exr_bytes(render(look), tmp_path)
+    match_look(look, counted, SIZE, MatchRequest(reference=data, locked=frozenset({"/environment"})))
+    assert [sorted(each.lights) for each in rendered[:2]] == [["Key/1"], ["Fill"]]
+    assert len(rendered) == 2 * 3  # two free lights and the locked one; once more for the report
 
 
 def test_a_picture_of_full_size_matches_small_images(gathered, tmp_path):
@@ -87,7 +121,10 @@ def test_a_picture_of_full_size_matches_small_images(gathered, tmp_path):
         return render_small(gathered, "front", look, 20)
 
     result = match_look(
-        look, render, MatchRequest(reference=exr_bytes(render_image(gathered, "front", wanted), tmp_path))
+        look,
+        render,
+        small_size(gathered, "front", 20),
+        MatchRequest(reference=exr_bytes(render_image(gathered, "front", wanted), tmp_path)),
     )
     assert result.match.residual < 0.06  # 0.10 without averages
     assert matched(look, result).lights["Key/1"].intensity == pytest.approx(3.0, rel=0.1)
@@ -97,7 +134,7 @@ def test_a_picture_of_full_size_matches_small_images(gathered, tmp_path):
 def test_the_tone_map_of_the_view_is_inverted(gathered, render, tone):
     look, wanted = look_of(gathered, tone=tone), look_of(gathered, tone=tone, **WANTED)
     display = to_bytes(tone_map(render(wanted), 0.5, tone))
-    result = match_look(look, render, MatchRequest(reference=png_bytes(display)))
+    result = match_look(look, render, SIZE, MatchRequest(reference=png_bytes(display)))
     assert relative_error(render(matched(look, result)), render(wanted)) < 0.02
 
 
@@ -105,9 +142,9 @@ def test_the_exposure_of_a_picture_can_be_free(gathered, render, tmp_path):
     """Ten times as bright as this look can tell: without exposure, the match is the current look."""
     look = look_of(gathered)
     data = exr_bytes(10 * render(look), tmp_path)
-    fitted = match_look(look, render, MatchRequest(reference=data, fits_exposure=True))
+    fitted = match_look(look, render, SIZE, MatchRequest(reference=data, fits_exposure=True))
     assert (fitted.operations, fitted.match.residual) == ([], pytest.approx(0.0, abs=1e-5))
-    absolute = match_look(look, render, MatchRequest(reference=data))
+    absolute = match_look(look, render, SIZE, MatchRequest(reference=data))
     assert absolute.match.stops["/environment"] == pytest.approx(np.log2(10), abs=0.02)
 
 
@@ -122,7 +159,7 @@ def test_a_picture_counts_only_in_its_strokes(gathered, render, tmp_path):
         return [Stroke("reference", mask)]
 
     request = MatchRequest(left_half, exr_bytes(picture, tmp_path))
-    assert match_look(look, render, request).match.residual < 0.02
+    assert match_look(look, render, SIZE, request).match.residual < 0.02
 
 
 def test_clipped_and_transparent_pixels_have_no_weight(gathered):
@@ -189,7 +226,9 @@ def test_shadow_catchers_are_refused(gathered, render):
 def test_the_rotation_of_the_environment_comes_back(gathered, render, tmp_path):
     look, wanted = look_of(gathered), look_of(gathered, environment={"rotation": 130.0, "intensity": 0.5})
     data = exr_bytes(render(wanted), tmp_path)
-    result = match_look(look, render, MatchRequest(reference=data, rotates=True))
+    result = match_look(look, render, SIZE, MatchRequest(reference=data, rotates=True))
     assert matched(look, result).environment.rotation == pytest.approx(130.0, abs=2.0)
-    locked = match_look(look, render, MatchRequest(reference=data, rotates=True, locked=frozenset(["/environment"])))
+    locked = match_look(
+        look, render, SIZE, MatchRequest(reference=data, rotates=True, locked=frozenset(["/environment"]))
+    )
     assert matched(look, locked).environment == look.environment

@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -281,7 +280,7 @@ class Control:
         openers_and_renderers = self._open, self._open, self._picture, self._render, self._render_small
         return Library(
             *openers_and_renderers,
-            lambda transfer, view, width, camera_and_size: partial(light_image, transfer.views[view]),
+            small_renderer,
             self._reference,
             lambda transfer, look: AovTracer.from_look(tiny_scene(), look),
             lambda folder: Viewport.from_scene(load_scene(folder)),
@@ -384,14 +383,21 @@ def get_ior(look: Any) -> float:
     return float(look.materials["Paper"].terms[1]["params"]["ior"])
 
 
-def light_image(view: FakeView, look: Any) -> np.ndarray:
+def small_renderer(
+    transfer: FakeTransfer, view: str, _width: int, _camera_and_size: object
+) -> tuple[tuple[int, int], Callable[[Any], np.ndarray]]:
     """A quarter of the pixels, of the color of a Lambert surface over 0.5: the environment lights them all, and local
     lights the left half."""
-    image = np.empty((view.height // 2, view.width // 2, 3), np.float32)
-    image[:] = look.environment.gain
-    for light in look.lights.values():
-        image[:, : view.width // 4] += np.asarray(light.gain, np.float32)
-    return image * np.array(look.materials["Paper"].terms[0]["color"], np.float32) / np.float32(0.5)
+    width, height = transfer.views[view].width // 2, transfer.views[view].height // 2
+
+    def render(look: Any) -> np.ndarray:
+        image = np.empty((height, width, 3), np.float32)
+        image[:] = look.environment.gain
+        for light in look.lights.values():
+            image[:, : width // 2] += np.asarray(light.gain, np.float32)
+        return image * np.array(look.materials["Paper"].terms[0]["color"], np.float32) / np.float32(0.5)
+
+    return (width, height), render
 
 
 def exact_pixel(look: Any) -> float:

@@ -1,12 +1,20 @@
 """IES files over HTTP: uploaded, listed, used by looks, rejected, and deleted when unused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from ies_files import cosine_web, ies_text
+from problems import parse_problem
+from server_fakes import tiny_scene
 
+from relume.assets.ies.ies_file import IesFile
+from relume.assets.ies.ies_store import IES_FILES
+from relume.scene.model import Light
 from relume_server.app import create_app
 from relume_server.settings import Settings
+from relume_worker.scenes import register_scene
 
 URL = "/api/ies"
 POLAR = np.arange(0, 91, 5)
@@ -47,3 +55,18 @@ def test_a_broken_file_is_rejected_with_the_reason(client):
     response = upload(client, "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 1000000 1 1 2 0 0 0\n")
     assert response.status_code == 422
     assert "1000000 vertical angles" in response.json()["detail"]
+
+
+def test_a_file_that_a_light_of_a_scene_uses_stays_until_the_scene_is_deleted(client):
+    data = ies_text(cosine_web(1, POLAR, scale=100), POLAR).encode()
+    profile = IES_FILES.name_of(data)
+    light = Light("Lamp", {"kind": "point", "position": [0.0, 1.0, 0.0], "profile": profile})
+    scene = replace(tiny_scene(), name="Gallery", lights=(light,), ies_files=(IesFile("Lamp", data),))
+    bakes, url = client.app.state.services.bakes, f"{URL}/{profile.removeprefix('ies:')}"
+    identity = register_scene(bakes.data_dir, bakes.ledger, scene)
+    problem = parse_problem(client.delete(url))
+    assert problem["status"] == 409
+    assert "scene 'Gallery'" in problem["detail"]
+    assert client.get(url).status_code == 200
+    assert client.delete(f"/api/scenes/{identity}").status_code == 204
+    assert client.delete(url).status_code == 204

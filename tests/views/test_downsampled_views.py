@@ -6,7 +6,7 @@ from session_edits import make_look
 
 from relume.core.cache import Cache
 from relume.live.opened.openers import open_transfer
-from relume.output.render_image import render_image, render_small
+from relume.output.render_image import render_image, render_small, small_size
 from relume.views.downsampled import DownsampledStore
 
 
@@ -38,6 +38,8 @@ def test_area_lights_on_remaining_pixels_equal_the_whole_image(gathered):
 def test_a_small_image_has_at_least_the_requested_width(transfer):
     look = make_look(transfer)
     widths = {width: render_small(transfer, "front", look, width).shape[1] for width in (10, 20, 32, 40, 64, 500)}
+    for width in (10, 20, 40, 500):
+        assert small_size(transfer, "front", width) == render_small(transfer, "front", look, width).shape[1::-1]
     assert widths == {10: 11, 20: 21, 32: 32, 40: 64, 64: 64, 500: 64}
 
 

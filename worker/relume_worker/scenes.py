@@ -39,8 +39,8 @@ class SceneRecord:
     Attributes:
         created: seconds since 1970.
         views: camera names, in order. aspects: width ÷ height of each in its file, or None.
-        materials: {"name", "terms", "shadow_catcher", "is_projected", "is_glass"} each, in the order of material ids;
-            old ones lack the last three.
+        materials: {"name", "terms", "shadow_catcher", "is_projected", "is_glass", "is_textured"} each, in the order of
+            material ids; old ones lack the last four.
         variants: partial looks of the file, by name.
         lights: names of the scene's lights.
         objects: names of its meshes; empty if there are more than `MAX_LISTED_OBJECTS`, and in old rows.
@@ -92,6 +92,7 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
                 "shadow_catcher": material.shadow_catcher,
                 "is_projected": is_triplanar,
                 "is_glass": material.glass is not None,
+                "is_textured": bool(material.textures) or material.normal_map is not None,
                 "objects": list(dict.fromkeys(mesh.name for mesh in listed if mesh.material == index)),
             }
             for index, (material, is_triplanar) in enumerate(zip(scene.materials, find_triplanar(scene), strict=True))
@@ -100,6 +101,7 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
         "num_triangles": sum(len(mesh.faces) for mesh in scene.meshes),
         "variants": scene.variants,
         "lights": [light.name for light in scene.lights],
+        "profiles": sorted({profile for light in scene.lights if (profile := light.fields.get("profile"))}),
         "objects": [mesh.name for mesh in listed],
         "import_options": scene.import_options,
         "size": _size(scene),
@@ -150,6 +152,13 @@ def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
     if row is None:
         raise NotFoundError(f"there is no scene {scene_id[:40]}; import it first")
     return _record(row)
+
+
+def scenes_referencing(ledger: Ledger, text: str) -> list[str]:
+    """Names of scenes whose lists contain a text, such as the IES file of a light, sorted; it has no wildcards."""
+    with ledger.sessions() as session:
+        query = select(SceneRow.name).where(SceneRow.summary.contains(text, autoescape=True))
+        return sorted(session.scalars(query))
 
 
 def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:

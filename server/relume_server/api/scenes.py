@@ -44,6 +44,7 @@ _MATERIAL_DEFAULTS = {
     "shadow_catcher": False,
     "is_projected": False,
     "is_glass": False,
+    "is_textured": True,
     "objects": (),
 }  # for records without these fields
 DEFAULT_ASPECT = 4 / 3  # of cameras with a vertical field of view only

@@ -50,11 +50,12 @@ def solve_request(request: SolveRequest, transfer: OpenBake, library: Library) -
     check_look(request.look, transfer, "/look")
     look = looks.validate(request.look, transfer.default_look)
     camera_and_size, size = _camera(request, transfer)
-    render = library.small_renderer(transfer, request.view, IMAGE_WIDTH, camera_and_size)
+    small_size, render = library.small_renderer(transfer, request.view, IMAGE_WIDTH, camera_and_size)
     reference = request.reference
     match = match_look(
         look,
         render,
+        small_size,
         MatchRequest(
             strokes=lambda small: _make_strokes(request.strokes, size, small),
             reference=None if reference is None else reference.image,

@@ -31,7 +31,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
     from relume.live.opened.openers import open_bake
     from relume.live.opened.static_view import StaticViewBuilder
     from relume.output.exr.aovs import AovTracer
-    from relume.output.render_image import needs_tracing, render_image, render_small
+    from relume.output.render_image import needs_tracing, render_image, render_small, small_size
     from relume.output.viewport import Viewport
     from relume.reference import render_reference
     from relume.scene.custom_camera import with_cameras
@@ -84,7 +84,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
                 key, lambda: render_small(transfer, view, look, width, camera_and_size)
             )
 
-        return render_cached
+        return small_size(transfer, view, width, camera_and_size), render_cached
 
     def _camera_key(camera: Camera, size: tuple[int, int]) -> tuple[Any, ...]:
         return camera.to_world.tobytes(), camera.yfov, camera.near, size

@@ -94,8 +94,8 @@ class Library:
             for `render_image`; `exact`: for a free camera, instead of the approximate image; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
             columns if the bake has them; `camera_and_size` as for `render`.
-        small_renderer: (transfer, view name, width, camera and size or None) -> the same as a function of the look,
-            which keeps its images in the cache.
+        small_renderer: (transfer, view name, width, camera and size or None) -> size of the images, and the same as
+            a function of the look, which keeps them in the cache.
         reference: (folder of a scene, camera, complete look, size, spp, progress, canceled, pass index, reflects=has
             indirect light, is_whole=all light paths requested) -> `relume.reference.ReferenceImage`; heavy.
         aov_tracer: (transfer, complete look) -> `relume.output.exr.aovs.AovTracer`; heavy.
@@ -111,7 +111,7 @@ class Library:
     make_picture: Callable[[Any, str], Picture]
     render: Callable[..., F32]
     render_small: Callable[[Any, str, Any, int], F32]
-    small_renderer: Callable[[Any, str, int, Any], Callable[[Any], F32]]
+    small_renderer: Callable[[Any, str, int, Any], tuple[tuple[int, int], Callable[[Any], F32]]]
     reference: Callable[..., ReferenceImage]
     aov_tracer: Callable[[Any, Any], AovTracer]
     open_viewport: Callable[[Path], PlacementViewport]

@@ -40,8 +40,8 @@ class SceneMaterial(Body):
 
     `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no
     texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks
-    edit its glass, but cannot make other materials transmit. `objects`: names of its objects; empty as those of the
-    scene.
+    edit its glass, but cannot make other materials transmit. `is_textured`: it has an image of the scene's file.
+    `objects`: names of its objects; empty as those of the scene.
     """
 
     name: str
@@ -49,6 +49,7 @@ class SceneMaterial(Body):
     shadow_catcher: bool
     is_projected: bool
     is_glass: bool
+    is_textured: bool
     objects: list[str]
 
 

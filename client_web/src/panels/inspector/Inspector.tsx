@@ -6,6 +6,7 @@ import { BaseColorImage } from "./images/BaseColorImage";
 import { EmissionImage } from "./images/EmissionImage";
 import { MetalnessImage } from "./images/MetalnessImage";
 import { NormalImage } from "./images/NormalImage";
+import { hasImages } from "./images/uv";
 import { UvControls } from "./images/UvControls";
 import { openLibrary } from "../library/libraryItems";
 import { LightInspector } from "./lights/LightInspector";
@@ -209,7 +210,9 @@ function MaterialInspector() {
           {materialLook.base == null && <EmissionImage material={material} />}
         </Section>
       )}
-      {!isShadowCatcher && materialLook !== undefined && <UvControls material={material} materialLook={materialLook} />}
+      {!isShadowCatcher && materialLook !== undefined && hasImages(materialLook, materialOf(material)) && (
+        <UvControls material={material} materialLook={materialLook} />
+      )}
       {materialLook !== undefined && <ObjectMaterials name={material} material={materialLook} />}
     </div>
   );

@@ -49,7 +49,7 @@ def get_ies(ies: Id, services: ServicesDep) -> IesBody:
 
 @router.delete("/{ies}", status_code=204)
 async def delete_ies(ies: Id, services: ServicesDep) -> Response:
-    """Delete an IES file that no saved look, share link, session of this server or running job uses."""
+    """Delete an IES file that no scene, saved look, share link, session of this server or running job uses."""
     await remove_unused(IES_FILES, ies_path(services.settings.data), ies, "ies", services)
     return Response(status_code=204)
 

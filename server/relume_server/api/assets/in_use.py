@@ -1,4 +1,4 @@
-"""Refuse to delete assets that looks use."""
+"""Refuse to delete assets that looks and scenes use."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from relume.assets.asset_store import AssetStore
 from relume_server.auth.quotas import OwnedKind
 from relume_server.errors import InUseError
 from relume_server.services import Services
+from relume_worker.scenes import scenes_referencing
 
 _MAX_NAMED = 3  # number of users listed in a message
 
@@ -19,7 +20,7 @@ _MAX_NAMED = 3  # number of users listed in a message
 async def remove_unused(
     store: AssetStore, folder: Path, identity: str, kind: OwnedKind, services: Services, called: str | None = None
 ) -> None:
-    """Delete an asset that no saved look, share link, session of this server or running job uses.
+    """Delete an asset that no scene, saved look, share link, session of this server or running job uses.
 
     Args:
         store, folder, identity: store, folder and id of the asset. kind: kind of asset, for quotas.
@@ -42,7 +43,8 @@ async def remove_unused(
 
 
 def _check_unused(label: str, quoted_id: str, services: Services, sessions: list[str]) -> None:
-    users = [f"look {name!r}" for name in services.looks.referencing(quoted_id)]
+    users = [f"scene {name!r}" for name in scenes_referencing(services.bakes.ledger, quoted_id)]
+    users += [f"look {name!r}" for name in services.looks.referencing(quoted_id)]
     users += [f"link {identity}" for identity in services.shares.referencing(quoted_id)]
     users += [f"a session of bake {bake}" for bake in sessions]
     for kind in (services.renders, services.comparisons):

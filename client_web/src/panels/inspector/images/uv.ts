@@ -1,6 +1,6 @@
 /** The transform of a material's texture coordinates. */
 import type { UvLook } from "../../../look.gen";
-import type { MaterialLook } from "../../../protocol";
+import type { MaterialLook, SceneMaterial } from "../../../protocol";
 
 export type UvTransform = Required<UvLook>;
 
@@ -17,4 +17,14 @@ export function withUv(material: MaterialLook, change: Partial<UvTransform>): Ma
   const uv = { ...uvOf(material), ...change };
   const isIdentity = [...uv.scale, uv.rotation, ...uv.offset].join() === "1,1,0,0,0";
   return isIdentity ? rest : { ...rest, uv };
+}
+
+/** True if a material has an image to place: of the scene or an uploaded one. One that is placed already counts. */
+export function hasImages({ terms, normal_map, uv }: MaterialLook, own?: SceneMaterial): boolean {
+  return (
+    own?.is_textured === true ||
+    normal_map != null ||
+    uv != null ||
+    terms.some((term) => term.texture != null || term.roughness_map != null)
+  );
 }
