@@ -23,7 +23,7 @@ FIXED_NAMES = {
 IN_PROCESS = [
     "bandwidth", "incremental", "curve_switch", "accuracy", "swap",
     "rays", "bake", "store_size", "paper_fig5", "accuracy_terms", "accuracy_generated", "pca",
-    "preview", "curve_switch_terms", "shade",
+    "turning", "curve_switch_terms", "shade",
     "estimators", "sharp_slider", "mesh_files",
     "factorization", "factorization_measured", "factorization_pictures", "large", "cryptomatte_file",
 ]  # fmt: skip
