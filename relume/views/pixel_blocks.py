@@ -43,7 +43,7 @@ def block_sizes(view: View, num_blocks: int) -> Shaped[NDArray[np.int64], " mate
     change = view.cache.transient.get_value(key, lambda: _normal_changes(view))
     num_samples = np.diff(view.bounds[: len(change) + 1])
     side = np.sqrt(np.sum(num_samples * change ** (4 / 3)) / num_blocks) * change ** (-2 / 3)
-    return np.maximum(np.rint(side), 1).astype(np.int64)
+    return np.asarray(np.maximum(np.rint(side), 1), np.int64)
 
 
 def _normal_changes(view: View) -> Shaped[NDArray[np.float64], " materials"]:
