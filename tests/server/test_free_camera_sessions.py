@@ -2,15 +2,17 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenImageIO
 import pytest
 import trimesh
 from fastapi.testclient import TestClient
 from server_fakes import InThreadSteps
 from session_client import Frame, Session, open_session
-from test_end_to_end import decode_rgb9e5, rendered_by, wait_until_done
+from test_end_to_end import assert_same, decode_rgb9e5, rendered_by, wait_until_done
 
 from relume_server.app import create_app
 from relume_server.client_state.flow_control import FrameWindow
@@ -204,6 +206,28 @@ def test_render_equals_the_first_frame(client: TestClient, bake: str, session: S
     picture = shown(session.exact(0))
     rendered = rendered_by(client, {"bake": bake, "view": view["name"], "looks": [{}]}, tmp_path)
     assert np.abs(picture - rendered).max() <= rendered.max() / 256 + 1e-4
+
+
+def test_sets_are_rendered_each_with_its_pose_of_the_free_camera(
+    client: TestClient, bake: str, session: Session, tmp_path: Path
+) -> None:
+    (view,) = hello(session)["views"]
+    poses = {"Near": camera_message(view, 0, 0.3), "Aside": camera_message(view, 0, 1.2)}
+    for name, message in poses.items():
+        etag = client.put(f"/api/looks/{name}", json={}, headers={"If-None-Match": "*"}).json()["etag"]
+        camera = {"to_world": message["to_world"], "yfov": math.degrees(message["yfov"])}
+        request = {"view": view["name"], "camera": camera}
+        answer = client.put(f"/api/looks/{name}/view", json=request, headers={"If-Match": etag})
+        assert answer.status_code == 204, answer.text
+    request = {"bake": bake, "view": view["name"], "looks": [], "saved_looks": [*poses], "saved_views": True}
+    url = client.post("/api/renders", json={**request, "format": "exr"}).headers["location"]
+    assert wait_until_done(client, url)["state"] == "ready"
+    for index, message in enumerate(poses.values()):
+        file = tmp_path / f"{index}.exr"
+        file.write_bytes(client.get(f"{url}/frames/{index}").content)
+        session.send_message(**{**message, "seq": index + 1})
+        picture = shown(exact_of(session, index + 1, 0))
+        assert_same(picture, OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT))
 
 
 @pytest.mark.parametrize(
