@@ -13,10 +13,11 @@ from relume.brdf.albedo import Reflectances
 from relume.images.image_store import load_texture
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.uv_transform import UvTransform
-from relume.math.zernike import OUTGOING_DEGREE, recurrence
+from relume.math.zernike import OUTGOING_DEGREE
 from relume.radiosity.binned_transport import incident_by_bins, mean_incoming
 from relume.radiosity.bounce import irradiance
 from relume.radiosity.highlight_tables import HighlightTables
+from relume.radiosity.patch_mean import mean_coefficients
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.surface_points import SurfacePoints
@@ -27,7 +28,7 @@ from relume.scene.model import Texture
 from relume.scene.texture_encoding import mean_value
 from relume.transport.direction_bins import DirectionBins, incoming_bins, outgoing_bins
 from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
-from relume.transport.outgoing_patch_light import NUM_OUTGOING, OutgoingLight
+from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.transport.shading_points import GatherRays
 
 F32 = NDArray[np.float32]
@@ -173,7 +174,13 @@ class PatchLight:
             self.first_points(rows),
             self._select_visible(np.ascontiguousarray(self.visible[rows, 0]), light_indices),
         )
-        return self.mean_coefficients(rows, points, incident_coefficients(points, visible, lights, (), degree))
+        return mean_coefficients(
+            self.tangents(rows), points, incident_coefficients(points, visible, lights, (), degree)
+        )
+
+    def tangents(self, rows: Shaped[NDArray[np.intp], " G"]) -> Shaped[F32, "G 3"]:
+        """Return the tangents of some patches."""
+        return np.ascontiguousarray(self.frames[rows, 0])
 
     def first_points(self, rows: Shaped[NDArray[np.intp], " G"]) -> SurfacePoints:
         """Return the first sample point of each of some patches."""
@@ -182,35 +189,6 @@ class PatchLight:
     def points_of(self, rows: Shaped[NDArray[np.intp], " G"]) -> SurfacePoints:
         """Return the sample points of some patches."""
         return self.points.rows((rows[:, None] * self.points_per_patch + np.arange(self.points_per_patch)).ravel())
-
-    def mean_coefficients(
-        self, rows: Shaped[NDArray[np.intp], " G"], points: SurfacePoints, point_coefficients: Shaped[F32, "n 3 k"]
-    ) -> Shaped[F32, "G 3 J"]:
-        """Average the coefficients of points over patches, rotated to the frames of the patches.
-
-        Args:
-            rows: the patches. points: the same number per patch, patch by patch.
-            point_coefficients: in the points' own frames, of any number of functions.
-        """
-        if len(rows) == 0:
-            return np.zeros((0, 3, NUM_OUTGOING), np.float32)
-        patch_tangent = np.repeat(self.frames[rows, 0], points.num_points // len(rows), axis=0)
-        bitangent = np.cross(points.normal, points.tangent)
-        angle = np.arctan2(
-            np.einsum("nc,nc->n", patch_tangent, bitangent), np.einsum("nc,nc->n", patch_tangent, points.tangent)
-        )
-        rotated, recurrence_table = (
-            np.zeros((*point_coefficients.shape[:2], NUM_OUTGOING), np.float32),
-            recurrence(OUTGOING_DEGREE),
-        )
-        width = min(NUM_OUTGOING, point_coefficients.shape[2])
-        rotated[..., :width] = point_coefficients[..., :width]
-        for m, cosine, sine in zip(recurrence_table.order, recurrence_table.cosine, recurrence_table.sine, strict=True):
-            if m and sine < width:
-                c, s = np.cos(m * angle)[:, None].astype(np.float32), np.sin(m * angle)[:, None].astype(np.float32)
-                rotated[..., cosine] = c * point_coefficients[..., cosine] + s * point_coefficients[..., sine]
-                rotated[..., sine] = c * point_coefficients[..., sine] - s * point_coefficients[..., cosine]
-        return np.asarray(rotated.reshape(len(rows), -1, 3, NUM_OUTGOING).mean(axis=1), np.float32)
 
     @property
     def _gather_hits_by_point(self) -> NDArray[np.uint16]:
@@ -227,20 +205,20 @@ class PatchLight:
         """
         if is_binned:
             return incident_by_bins(self.gather_hits, self.outgoing_bins, self.incident_bins, outgoing, rows)
-        gather_hits = self._gather_hits_by_point
-        point_values = ray_incident_coefficients(self.points, [GatherRays(gather_hits, self.pattern, outgoing)], 0)[
-            ..., 0
-        ]
+        others = np.setdiff1d(np.arange(self.num_patches), rows)
+        coefficients = self._gathered(outgoing, rows, OUTGOING_DEGREE)
+        patch_irradiance = np.empty((self.num_patches, 3), np.float32)
         # coefficient of the first function, 1 / √π
-        patch_irradiance = _ROOT_PI * point_values.reshape(-1, self.points_per_patch, 3).mean(axis=1)
+        patch_irradiance[rows] = _ROOT_PI * coefficients[..., 0]
+        patch_irradiance[others] = _ROOT_PI * self._gathered(outgoing, others, 0)[..., 0]
+        return IncidentLight(patch_irradiance, coefficients)
+
+    def _gathered(self, outgoing: OutgoingLight, rows: Shaped[NDArray[np.intp], " G"], degree: int) -> F32:
+        """Return coefficients of patches `rows` from their gather rays; zero beyond the degree. (G, 3, J)"""
         points = self.points_of(rows)
-        row_hits = self.gather_hits[rows].reshape(points.num_points, self.pattern.num_rays)
-        point_coefficients = ray_incident_coefficients(
-            points, [GatherRays(row_hits, self.pattern, outgoing)], OUTGOING_DEGREE
-        )
-        return IncidentLight(
-            patch_irradiance.astype(np.float32), self.mean_coefficients(rows, points, point_coefficients)
-        )
+        hits = self.gather_hits[rows].reshape(points.num_points, self.pattern.num_rays)
+        of_points = ray_incident_coefficients(points, [GatherRays(hits, self.pattern, outgoing)], degree)
+        return mean_coefficients(self.tangents(rows), points, of_points)
 
     def mean_to_others(
         self,

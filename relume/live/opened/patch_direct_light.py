@@ -23,6 +23,7 @@ from relume.math.zernike import OUTGOING_DEGREE
 from relume.methods.spherical_harmonic_transfer import PATCH_DEGREE
 from relume.radiosity.highlight_transport import DirectLobes
 from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.patch_mean import mean_coefficients
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
 from relume.raytrace.local_light_visibility import compute_irradiance
 from relume.raytrace.moving_light import MovingLight
@@ -220,7 +221,7 @@ class DirectPatchLight:
         split = harmonic.frequency_split(lights)
         residual = patches.incident_coefficients(rows, split.residual, PATCH_DEGREE, split.residual_triangles)
         low_frequency = np.einsum("gkl,lc->gck", harmonic.patch_coefficients[rows], split.low_frequency)
-        return residual + patches.mean_coefficients(rows, patches.first_points(rows), low_frequency)
+        return residual + mean_coefficients(patches.tangents(rows), patches.first_points(rows), low_frequency)
 
     def _local_coefficients(
         self, geometry: LightGeometry, reflectance_operator: ReflectanceOperator, is_preview: bool
@@ -233,7 +234,9 @@ class DirectPatchLight:
                 points, rays = patches.first_points(rows), self._local.preview_rays(geometry, rows)
             else:
                 points, rays = patches.points_of(rows), self._local.rays(geometry, rows)
-            return patches.mean_coefficients(rows, points, ray_incident_coefficients(points, [rays], OUTGOING_DEGREE))
+            return mean_coefficients(
+                patches.tangents(rows), points, ray_incident_coefficients(points, [rays], OUTGOING_DEGREE)
+            )
 
         cache, label = self._cache.transient if is_preview else self._cache, "light on patches, directional"
         return cache.get_value(
