@@ -14,9 +14,9 @@ from __future__ import annotations
 import gc
 import tempfile
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,7 @@ from relume.store.run_bake import bake_in_process
 SIZE, NUM_LIGHTS, NUM_PROBES, NUM_PATCHES, NUM_RAYS = (16, 12), 256, 300, 300, 64  # enough lights to be grouped
 LARGER_SIZE = 64, 48  # of a free camera: with edges and edges of shadows
 CACHE_BYTES = 1 << 28
+VIEW = "front"  # of the built-in scene
 ANALYTIC = tuple(model for model, term in TERMS.items() if not term.needs_data)
 # the first has no angle, the second has an angle with a parameter: rays distinguish no more cases
 RAY_MODELS = (
@@ -66,12 +67,19 @@ _POLISHED_ROUGHNESS = (0.1, 0.09)
 def precompile() -> None:
     """Bake with every method, edit each analytic term by each curve and parameter, add and move local lights.
 
-    Cost: a minute and a half of two cores, 15 s when everything is compiled.
+    Raises:
+        ChildProcessError: the process that compiles half of the kernels failed; its error is printed.
     """
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        pictures = pool.submit(_compile_pictures)
-        _compile_rays()
-        pictures.result()
+    context = get_context("spawn")
+    has_shared = context.Event()
+    pictures = context.Process(target=_compile_pictures, args=(has_shared,))
+    pictures.start()
+    try:
+        _compile_rays(has_shared)
+    finally:
+        pictures.join()
+    if pictures.exitcode:
+        raise ChildProcessError(f"compiling the kernels of fixed cameras ended with status {pictures.exitcode}")
 
 
 def _collect_rarely() -> None:
@@ -80,22 +88,41 @@ def _collect_rarely() -> None:
     gc.set_threshold(20_000, 20, 20)
 
 
-def _compile_pictures() -> None:
-    """Compile the kernels of the method `direct`, half of all there are."""
+def _compile_pictures(has_shared: Event) -> None:
+    """Compile the kernels of the method `direct`, half of all there are.
+
+    Args:
+        has_shared: set when the kernels exist that other methods use as well.
+    """
     _collect_rarely()
     with _temporary_scene() as (scene, folder):
-        _exercise(METHODS["direct"], scene, folder, ANALYTIC)
+        try:
+            transfer = _bake_and_open(METHODS["direct"], scene, folder)
+            _polish(transfer, _picture(transfer))
+            _move_lights(transfer, _picture(transfer))
+        finally:
+            has_shared.set()
+        _apply_btf(transfer, _picture(transfer), folder)
+        _edit(transfer, _picture(transfer), ANALYTIC)
         _compare(scene)
     _evaluate_measured()
     compile_kernels()
 
 
-def _compile_rays() -> None:
-    """Compile the kernels of gather rays; `gather` comes last, when the kernels it shares with `direct` exist."""
+def _compile_rays(has_shared: Event) -> None:
+    """Compile the kernels of free cameras and gather rays, less those that `direct` uses: see `_compile_pictures`."""
     _collect_rarely()
     with _temporary_scene() as (scene, folder):
-        for method in (METHODS["probes"], METHODS["gather"]):
-            _exercise(method, scene, folder, RAY_MODELS)
+        transfer = _bake_and_open(METHODS["probes"], scene, folder)
+        _move_cameras(transfer, FreeCameraPicture(transfer, VIEW, is_watched=True))
+        has_shared.wait()
+        _polish(transfer, FreeCameraPicture(transfer, VIEW))
+        _apply_btf(transfer, FreeCameraPicture(transfer, VIEW), folder)
+        transfer = _bake_and_open(METHODS["gather"], scene, folder)
+        _polish(transfer, _picture(transfer))
+        _move_lights(transfer, _picture(transfer))
+        _apply_btf(transfer, _picture(transfer), folder)
+        _edit(transfer, _picture(transfer), RAY_MODELS)
 
 
 @contextmanager
@@ -106,24 +133,18 @@ def _temporary_scene() -> Iterator[tuple[Scene, Path]]:
         yield load_scene(Path(name) / "scene"), Path(name)
 
 
-def _exercise(method: BakeMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
-    """Bake, open, edit terms of some models, and move everything that can move."""
+def _bake_and_open(method: BakeMethod, scene: Scene, folder: Path) -> Any:
+    """Bake the first view of a scene, and open it."""
     recipe = Recipe(
-        method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS,
+        method.name, (VIEW,), SIZE, NUM_LIGHTS,
         num_probes=NUM_PROBES, num_patches=NUM_PATCHES, gather_rays=None if method.name == "direct" else NUM_RAYS,
     )  # fmt: skip
-    transfer: Any = open_bake(
-        bake_in_process(method, scene, recipe, folder / f"{method.name}.zarr"), Cache(CACHE_BYTES)
-    )
-    if isinstance(transfer, BakedFreeCamera):
-        _move_cameras(transfer, FreeCameraPicture(transfer, recipe.views[0], is_watched=True))
-        _polish(transfer, FreeCameraPicture(transfer, recipe.views[0]))
-        _apply_btf(transfer, FreeCameraPicture(transfer, recipe.views[0]), folder)
-        return
-    _apply_btf(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), folder)
-    _edit(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)), models)
-    _polish(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)))
-    _move_lights(transfer, Picture(transfer, recipe.views[0], Cache(CACHE_BYTES)))
+    return open_bake(bake_in_process(method, scene, recipe, folder / f"{method.name}.zarr"), Cache(CACHE_BYTES))
+
+
+def _picture(transfer: FixedViewTransfer) -> Picture:
+    """Return a new picture with an empty cache."""
+    return Picture(transfer, VIEW, Cache(CACHE_BYTES))
 
 
 def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) -> None:
