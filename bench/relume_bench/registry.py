@@ -128,6 +128,7 @@ GROUPS = (
     Group("relume_bench.workers", ("bake.two_workers_speedup",)),
     Group("relume_bench.session", ("session.edit_to_socket_ms.p50", "session.edit_to_socket_ms.p95")),
     Group("relume_bench.refusal", ("import.refusal_ms",)),
+    Group("relume_bench.setup_kernels", ("setup.kernels_s",)),
     Group("relume_bench.slow_readers", ("slow_readers.mb",)),
     Group("relume_bench.room_join", ("rooms.join_s",)),
     Group("relume_bench.load", ("load.drag_with_renders_ratio",)),

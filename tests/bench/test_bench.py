@@ -37,7 +37,7 @@ LONG = [
     "free_camera_exact", "rotation", "btf_several", "btf_moving", "plan_disk", "probes_live", "probes_error", "assets",
     "export_round_trip", "export_blender", "light_groups", "lens",
     "opening", "flood", "slow_readers", "room_join", "render_workers", "scaling.simulation", "scaling.unit_costs",
-    "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits", "solve",
+    "sharp", "sharp_room", "sharp_checker", "sharp_maps", "sharp_free_camera", "sharp_edits", "setup_kernels", "solve",
 ]  # fmt: skip
 # figures from random points or a noisy renderer have a standard error
 ESTIMATES = (
