@@ -34,7 +34,7 @@ _CACHE_BYTES = 4 << 30
 _POINTER = "/environment/rotation"
 
 
-class _Drag(NamedTuple):
+class _Turning(NamedTuple):
     """Median seconds of a picture while the environment turns, its error, and seconds of the exact one."""
 
     picture_s: float
@@ -53,7 +53,7 @@ def measure(tiny: bool) -> list[Figure]:
     ]
 
 
-def _drag(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Drag:
+def _drag(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Turning:
     """Turn in five steps, then converge."""
     scene = demo_scene()
     view = scene.cameras[0].name
@@ -67,7 +67,7 @@ def _drag(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Drag:
         times = [seconds(partial(_turn, picture, transfer, angle)) for angle in range(10, 51, 10)]
         turned = picture.image()
         exact_s = seconds(partial(_run_until_exact, picture))
-        return _Drag(float(np.median(times)), relative_rmse(turned, picture.image()), exact_s)
+        return _Turning(float(np.median(times)), relative_rmse(turned, picture.image()), exact_s)
 
 
 def _turn(picture: Picture, transfer: FixedViewTransfer, angle: float) -> None:

@@ -6,7 +6,7 @@ import { isSoftwareRenderer } from "../render/freeCamera/isSoftwareRenderer";
 import { getJson, request } from "./net/api";
 import type { Frame } from "./net/binaryFrame";
 import { PROBES_LAYOUT, type FreeCameraBody } from "../protocol";
-import { usesTexelShading } from "../state/look";
+import { usesTexelShading } from "../state/texelShading";
 import { showNote } from "../ui/toasts";
 import { ClientRenderer } from "./clientRenderer";
 import { connections, type BakeConnection } from "./connections";

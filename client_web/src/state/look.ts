@@ -2,9 +2,7 @@
 import { computed, signal } from "@preact/signals";
 import { DEFAULTS } from "../look.gen";
 import { displayMatrix } from "../render/color/whiteBalance";
-import { isImageReference } from "./document/imageReference";
-import type { Look, MaterialLook, Term } from "../protocol";
-import { materialOf } from "./scene";
+import type { Look, Term } from "../protocol";
 
 export const look = signal<Look | null>(null);
 /** The scene's own look, for resets. */
@@ -20,18 +18,3 @@ export const displayGain = computed(() => displayMatrix(exposure.value, temperat
 export const usesBakedEnvironment = computed(() => (look.value?.environment.map ?? null) === null);
 /** True for a BTF term, whose texels the server draws. */
 export const isBtfTerm = (term: Term): boolean => term.model === "measured_btf";
-/** True if a material without UVs has a tri-planar texture, which this browser cannot draw. */
-const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>
-  materialOf(name)?.is_projected === true &&
-  ((normal_map ?? null) !== null || terms.some(({ texture }) => isImageReference(texture)));
-/** True if the server draws the image: a material has a BTF, a tri-planar texture or transformed texture coordinates, or
- * is one of some objects. */
-export const usesTexelShading = computed(() =>
-  Object.entries(look.value?.materials ?? {}).some(
-    ([name, material]) =>
-      material.base != null ||
-      material.uv != null ||
-      material.terms.some(isBtfTerm) ||
-      usesTriPlanarMaps(name, material),
-  ),
-);

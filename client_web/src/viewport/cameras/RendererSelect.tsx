@@ -7,7 +7,7 @@ import {
   tracesLobes,
   type RendererMode,
 } from "../../session/clientRendering";
-import { usesTexelShading } from "../../state/look";
+import { usesTexelShading } from "../../state/texelShading";
 
 const BROWSER_TITLE =
   "This browser draws while the camera moves and loads no pictures. The server draws sharp shadows of the sun and of small " +
