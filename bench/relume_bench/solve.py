@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,8 @@ def measure(tiny: bool) -> list[Figure]:
         def render(look: Look) -> F32:
             return render_small(transfer, _VIEW, look, _WIDTH)
 
+        render_whole = partial(render_image, transfer, _VIEW)
+
         start, target = _looks(transfer.default_look, num_lights, rng)
         picture, small = render_image(transfer, _VIEW, target)[..., :3], render(target)[..., :3]
         context = {"lights": num_lights, "size": list(size), "solved_size": list(small.shape[1::-1])}
@@ -57,7 +60,15 @@ def measure(tiny: bool) -> list[Figure]:
         for name, noise in (("solve.error", 0.0), ("solve.error_noisy", _NOISE)):
             noisy = picture * (1.0 + noise * rng.standard_normal(picture.shape))
             lights_alone, with_materials = (
-                _error(start, render, noisy.astype(np.float32), small, Path(folder), materials)
+                _error(
+                    start,
+                    render,
+                    render_whole,
+                    noisy.astype(np.float32),
+                    small,
+                    Path(folder),
+                    materials,
+                )
                 for materials in (frozenset[str](), _MATERIALS)
             )
             errors = {"noise": noise, "materials": sorted(_MATERIALS), "lights_alone": lights_alone}
@@ -89,11 +100,19 @@ def _looks(default_look: dict[str, Any], num_lights: int, rng: np.random.Generat
     return validate(complete(start, default_look), default_look), validate(complete(target, default_look), default_look)
 
 
-def _error(look: Look, render: RenderLook, target: F32, picture: F32, folder: Path, materials: frozenset[str]) -> float:
+def _error(
+    look: Look,
+    render: RenderLook,
+    render_whole: RenderLook,
+    target: F32,
+    picture: F32,
+    folder: Path,
+    materials: frozenset[str],
+) -> float:
     """Match a look to a target of full size, and compare its small image with that of the picture."""
     write_image(folder / "target.exr", target)
     request = MatchRequest(reference=(folder / "target.exr").read_bytes(), materials=materials)
-    match = match_look(look, render, (picture.shape[1], picture.shape[0]), request)
+    match = match_look(look, render, render_whole, (picture.shape[1], picture.shape[0]), request)
     after = Look.model_validate(merge_changes(look.model_dump(mode="json"), match.operations))
     return float(np.linalg.norm(render(after)[..., :3] - picture) / np.linalg.norm(picture))
 

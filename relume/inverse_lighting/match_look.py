@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relume.image_io.downsample import downsample
 from relume.inverse_lighting.match_lights import Match, match_lights
 from relume.inverse_lighting.match_materials import match_materials
 from relume.inverse_lighting.painting import PaintedTarget, Stroke, painted_target
@@ -33,6 +34,7 @@ REFERENCE_RIDGE = 1e-6
 _REFERENCE_BLOCK = 4
 """Side of the blocks of pixels that are averaged if there is a reference picture: pixels of small images are samples of
 the image, those of a reference picture averages, and at edges and highlights they would differ by 20 %."""
+_MAX_RATIO = 2.0  # of the averages of samples and pixels
 Size = tuple[int, int]
 MakeStrokes = Callable[[Size], Sequence[Stroke]]
 
@@ -71,23 +73,26 @@ class LookMatch:
     match: Match
 
 
-def match_look(look: Look, render: RenderLook, size: Size, request: MatchRequest) -> LookMatch:
+def match_look(
+    look: Look, render: RenderLook, render_whole: RenderLook, size: Size, request: MatchRequest
+) -> LookMatch:
     """Find the lights, and the materials by request, with which the image of a look is nearest to a target.
 
     Args:
         look: the current look. render: renders small images of looks. size: width and height of these images.
+        render_whole: renders images of any size, of which the small ones are samples; once, for a reference picture.
         request: the target.
     Raises:
         EditError: the look's image is not linear in its lights. SceneError: the reference picture cannot be read.
         ParameterError: the request does not fit the look.
     """
-    reference = None
-    if request.reference is not None:
-        reference = read_reference(request.reference, look.display, size)
-        reference, render = reference.averaged(_REFERENCE_BLOCK), _averaged(render, reference.weights)
+    picture = None if request.reference is None else read_reference(request.reference, look.display, size)
+    if picture is not None:
+        render = _averaged(render, picture.weights)
     load = partial(load_sources, render=render, locked=request.locked)
     sources = load(look)
     before = sources.image(sources.strengths)
+    reference = None if picture is None else _as_sampled(picture, before, downsample(render_whole(look)[..., :3], size))
     painted = _painted(before, request, reference)
     ridge = RIDGE if request.reference is None else REFERENCE_RIDGE
 
@@ -105,6 +110,22 @@ def match_look(look: Look, render: RenderLook, size: Size, request: MatchRequest
     if request.materials and painted.marked.any():
         after = match_materials(after, request.materials, render, load, painted.target, match, ridge)
     return _look_match(look, after, match(load(after)))
+
+
+def _as_sampled(picture: Target, samples: F32, pixels: F32) -> Target:
+    """Return averages of a picture as samples would show it: times the ratio of both for the current look.
+
+    The ratio is at most two. It takes away half of the difference, since textures, edges and shadows remain in place.
+
+    Args:
+        picture: averages over pixels. samples: averages over blocks of samples of the current look.
+        pixels: averages over pixels of its image.
+    """
+    averaged = picture.averaged(_REFERENCE_BLOCK)
+    mean = average_blocks(pixels, picture.weights, _REFERENCE_BLOCK)
+    least = 1e-3 * mean.mean() + 1e-12
+    ratio = np.clip((samples + least) / (mean + least), 1 / _MAX_RATIO, _MAX_RATIO)
+    return replace(averaged, radiance=np.asarray(averaged.radiance * ratio, np.float32))
 
 
 def _averaged(render: RenderLook, weights: F32) -> RenderLook:

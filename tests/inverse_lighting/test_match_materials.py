@@ -49,13 +49,13 @@ def test_lights_and_two_materials_of_a_picture_come_back(gathered, render, tmp_p
     picture = render(wanted)
     noisy = picture * (1 + noise * np.random.default_rng(0).standard_normal(picture.shape))
     names = frozenset({"Red", "Floor"})
-    result = match_look(look, render, SIZE, picture_request(noisy, tmp_path, materials=names))
+    result = match_look(look, render, render, SIZE, picture_request(noisy, tmp_path, materials=names))
     after = matched(look, result)
     assert relative_error(render(after), picture) < (0.01 if noise == 0.0 else 0.03)
     assert result.match.residual_before == pytest.approx(relative_residual(render, look, noisy), rel=0.1)
     assert result.materials == ("Floor", "Red")
     np.testing.assert_allclose(after.materials["Red"].terms[0]["color"], (0.2, 0.4, 0.6), atol=0.05)
-    without = match_look(look, render, SIZE, picture_request(noisy, tmp_path))
+    without = match_look(look, render, render, SIZE, picture_request(noisy, tmp_path))
     assert without.materials == ()
     assert without.match.residual > 5 * max(result.match.residual - noise, 0.005)
 
@@ -77,7 +77,7 @@ def test_locked_lights_determine_the_color_of_a_material_by_few_renders(gathered
     request = picture_request(
         render(wanted), tmp_path, materials=frozenset({"Red"}), locked=frozenset({"/environment", "/lights/Key"})
     )
-    result = match_look(look, counted, SIZE, request)
+    result = match_look(look, counted, render, SIZE, request)
     np.testing.assert_allclose(matched(look, result).materials["Red"].terms[0]["color"], (0.3, 0.2, 0.7), atol=0.01)
     assert [operation["path"] for operation in result.operations] == ["/materials/Red/terms"]
     assert result.match.residual < 0.01
@@ -95,7 +95,7 @@ def test_a_stroke_changes_a_material_that_only_it_can(gathered, render):
         locked=frozenset({"/environment", "/lights/Key"}),
         changes_color=False,
     )
-    result = match_look(look, render, SIZE, request)
+    result = match_look(look, render, render, SIZE, request)
     ratio = render(matched(look, result))[mask > 0].mean() / render(look)[mask > 0].mean()
     assert ratio == pytest.approx(0.5, abs=0.05)
     assert result.match.shortfalls == ()
@@ -103,14 +103,16 @@ def test_a_stroke_changes_a_material_that_only_it_can(gathered, render):
 
 def test_materials_that_are_not_named_stay(gathered, render, tmp_path):
     look, wanted = look_of(gathered), look_of(gathered, red=(0.2, 0.4, 0.6))
-    result = match_look(look, render, SIZE, picture_request(render(wanted), tmp_path, materials=frozenset({"Blue"})))
+    result = match_look(
+        look, render, render, SIZE, picture_request(render(wanted), tmp_path, materials=frozenset({"Blue"}))
+    )
     after = matched(look, result)
     assert after.materials["Red"] == look.materials["Red"]
     assert after.materials["Floor"] == look.materials["Floor"]
 
 
 def test_without_a_target_materials_stay(gathered, render):
-    result = match_look(look_of(gathered), render, SIZE, MatchRequest(materials=frozenset({"Red"})))
+    result = match_look(look_of(gathered), render, render, SIZE, MatchRequest(materials=frozenset({"Red"})))
     assert (result.operations, result.materials) == ([], ())
 
 

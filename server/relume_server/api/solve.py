@@ -51,10 +51,12 @@ def solve_request(request: SolveRequest, transfer: OpenBake, library: Library) -
     look = looks.validate(request.look, transfer.default_look)
     camera_and_size, size = _camera(request, transfer)
     small_size, render = library.small_renderer(transfer, request.view, IMAGE_WIDTH, camera_and_size)
+    _, render_whole = library.small_renderer(transfer, request.view, size[0], camera_and_size)
     reference = request.reference
     match = match_look(
         look,
         render,
+        render_whole,
         small_size,
         MatchRequest(
             strokes=lambda small: _make_strokes(request.strokes, size, small),
