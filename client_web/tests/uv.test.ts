@@ -20,7 +20,7 @@ test("only materials with images can be placed", () => {
   const withTerm = (fields: Partial<Term>): MaterialLook => ({ terms: [{ model: "lambert", ...fields } as Term] });
   const own = { name: "", terms: [], shadow_catcher: false, is_projected: false, is_glass: false, objects: [] };
   expect(hasImages(withTerm({ texture: null, roughness_map: null }))).toBe(false);
-  expect(hasImages(plain, { ...own, is_textured: false })).toBe(false);
+  expect(hasImages(withTerm({ texture: "diffuse" }), { ...own, is_textured: false })).toBe(false);
   expect(hasImages(plain, { ...own, is_textured: true })).toBe(true);
   expect(hasImages(withTerm({ texture: "image:0123456789abcdef" }))).toBe(true);
   expect(hasImages(withTerm({ roughness_map: "roughness" }))).toBe(true);

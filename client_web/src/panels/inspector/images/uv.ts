@@ -1,6 +1,7 @@
 /** The transform of a material's texture coordinates. */
 import type { UvLook } from "../../../look.gen";
 import type { MaterialLook, SceneMaterial } from "../../../protocol";
+import { isImageReference } from "../../../state/document/imageReference";
 
 export type UvTransform = Required<UvLook>;
 
@@ -19,12 +20,13 @@ export function withUv(material: MaterialLook, change: Partial<UvTransform>): Ma
   return isIdentity ? rest : { ...rest, uv };
 }
 
-/** True if a material has an image to place: of the scene or an uploaded one. One that is placed already counts. */
+/** True if a material has an image to place: of the scene or an uploaded one. One that is placed already counts.
+ * Terms name the scene's textures whether it has them or not. */
 export function hasImages({ terms, normal_map, uv }: MaterialLook, own?: SceneMaterial): boolean {
   return (
     own?.is_textured === true ||
     normal_map != null ||
     uv != null ||
-    terms.some((term) => term.texture != null || term.roughness_map != null)
+    terms.some((term) => isImageReference(term.texture) || term.roughness_map != null)
   );
 }
