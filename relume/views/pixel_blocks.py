@@ -19,6 +19,7 @@ F32 = NDArray[np.float32]
 _BLOCKS_PER_NORMAL_UNIT = 10.0  # blocks of distance that count as much as a unit of normal difference
 _MAX_DISTANCE = np.float32(1e30)
 _BLOCK_RADIUS = 2  # search radius in blocks
+_LEAST_PART = np.float32(0.999)  # of the farthest neighbor's weight, which is subtracted from all
 _LEAST_CHANGE = 0.05  # of a normal: light varies on flat surfaces, too
 
 
@@ -78,7 +79,9 @@ def nearest_chosen(
 ) -> tuple[Shaped[NDArray[np.int32], "n k"], Shaped[F32, "n k"]]:
     """Find the nearest chosen samples of each sample of a material, by pixel position and normal, and their weights.
 
-    Searches the sample's own block and the blocks around it, up to two in each direction.
+    Searches the sample's own block and the blocks around it, up to two in each direction. Weights fall to nearly zero
+    at the farthest neighbor, 1 / d² − 1 / d_far² (modified Shepard interpolation), so that images are smooth where the
+    neighbors change.
 
     Args:
         view, material, block_size: as in `one_per_block`, which returned `subset`.
@@ -144,8 +147,9 @@ def _find_nearest(
                     k -= 1
                 best_squared[k], neighbors[s, k] = squared_distance, candidate
         total = np.float32(0)
+        farthest = _LEAST_PART / (best_squared[num_neighbors - 1] + softening)
         for k in range(num_neighbors):
-            weight[s, k] = 1 / (best_squared[k] + softening) if best_squared[k] < _MAX_DISTANCE else 0
+            weight[s, k] = 1 / (best_squared[k] + softening) - farthest if best_squared[k] < _MAX_DISTANCE else 0
             total += weight[s, k]
         for k in range(num_neighbors):
             weight[s, k] /= total

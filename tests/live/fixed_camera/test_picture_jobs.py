@@ -91,7 +91,7 @@ def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
 
 
 def test_a_curve_without_operator_is_shaded_while_a_rotation_is_prepared(transfer):
-    picture = open_exact_picture(transfer, cache=Cache(400_000))
+    picture = open_exact_picture(transfer, cache=Cache(600_000))
     picture.prepare("/environment/rotation")
     job = picture.next_job()
     assert kind_of(job) == "preview"

@@ -38,7 +38,7 @@ _NUM_SHADED = 8000  # approximate number of samples in a view
 _MAX_SHADED_AT_ONCE = 6 * _NUM_SHADED  # samples of terms in a view that take as long as selecting a subset
 _DETAIL_FACTOR = 8  # ratio of samples between levels of detail
 _MIN_FINER_RATIO = 16  # times the samples of a finer preview; with fewer, all are shaded
-_NUM_NEIGHBORS = 3
+_NUM_NEIGHBORS = 5
 _SOFTENING = 0.5  # pixels²; smooths the interpolation weights near a shaded sample
 
 
