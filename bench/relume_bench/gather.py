@@ -28,6 +28,7 @@ from relume.store.bake_protocol import Recipe, Task, TaskOutput
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.timing import percentiles, seconds
+from relume_bench.until_exact import run_until_exact
 
 _NAMES = ("gather.bake_s", "gather.store_mb", "gather.freeze_s", "gather.brdf_fps")
 FLOOR = "/materials/Floor/terms/1"
@@ -113,13 +114,6 @@ def open_exact_picture(transfer: FixedViewTransfer) -> Picture:
     picture = Picture(transfer, "front", Cache(4 << 30))
     run_until_exact(picture)
     return picture
-
-
-def run_until_exact(picture: Picture) -> None:
-    """Run all pending jobs."""
-    while not picture.advance(None).exact or picture.next_job() is not None:
-        if picture.next_job() is not None:
-            picture.run_next_job(lambda share: None, lambda: False)
 
 
 def _time_freezes(transfer: FixedViewTransfer, picture: Picture) -> dict[str, float]:

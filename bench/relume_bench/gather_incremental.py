@@ -24,8 +24,9 @@ from relume.live.opened.openers import open_transfer
 from relume.look import validate
 from relume.scene.examples.cornell import cornell_box
 from relume_bench.figure import Figure
-from relume_bench.gather import bake, make_recipe, run_until_exact
+from relume_bench.gather import bake, make_recipe
 from relume_bench.points import relative_rmse
+from relume_bench.until_exact import run_until_exact
 
 Document = dict[str, Any]
 Edit = Callable[[Document, float], None]

@@ -30,9 +30,10 @@ from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Scene
 from relume_bench.figure import Figure
-from relume_bench.gather import bake, make_recipe, run_until_exact
+from relume_bench.gather import bake, make_recipe
 from relume_bench.rays import embreex_scene
 from relume_bench.timing import seconds, time_interleaved
+from relume_bench.until_exact import run_until_exact
 
 _NAMES = ("gather.light_move_fps", "gather.area_light_move_fps", "gather.light_intensity_fps")
 _SPEED = "frames/s"

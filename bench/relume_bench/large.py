@@ -30,6 +30,7 @@ from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.scenes import cook_torrance, teapot_on_table
+from relume_bench.until_exact import run_until_exact
 
 _ROOMY, _BANDS = 16 << 30, 256
 _ACTIVE_POINTER = "/materials/Teapot/terms/0/curves/theta_h"
@@ -113,6 +114,5 @@ def _measure_edits(transfer: FixedViewTransfer, looks: list[Look], budget_bytes:
 def _open_exact(transfer: FixedViewTransfer, look: Look, cache: Cache) -> Picture:
     picture = Picture(transfer, "front", cache)
     picture.set_look(look)
-    while not picture.advance(None).exact or picture.next_job() is not None:
-        picture.run_next_job(lambda share: None, lambda: False)
+    run_until_exact(picture)
     return picture

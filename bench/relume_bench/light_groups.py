@@ -30,6 +30,7 @@ from relume.scene.scene_folder import make_scene
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
+from relume_bench.until_exact import run_until_exact
 
 _MS = "lights.groups_ms"
 _NUM_LIGHTS = {_MS: 1000, "lights.groups_rmse_1000": 1000, "lights.groups_rmse_10000": 10_000}
@@ -93,7 +94,6 @@ def _fader(folder: Path, num_lights: int, tiny: bool) -> Figure:
         if k > 0:  # the first shades all lights, and the group alone
             picture.encode(picture.advance(None).tiles, "rgb9e5")
             durations.append(1000 * (time.perf_counter() - start_time))
-        while not picture.advance(None).exact or picture.next_job() is not None:
-            picture.run_next_job(lambda share: None, lambda: False)
+        run_until_exact(picture)
     context = {"size": list(size), "method": method, "lights": num_lights, "sources": len(scene.lights)}
     return Figure(_MS, float(np.median(durations)), "ms", context)

@@ -41,6 +41,7 @@ from relume_bench.indirect import PASSES
 from relume_bench.light_assets import light_assets, mitsuba_texture
 from relume_bench.mitsuba import averaged, bsdf, missing, read_passes, render
 from relume_bench.standard_error import compare_with_passes
+from relume_bench.until_exact import run_until_exact
 
 F64 = NDArray[np.float64]
 
@@ -206,6 +207,5 @@ def _gain_fps(folder: Path, tiny: bool) -> Figure:
         if k > 1:  # the first shades all, the second one light alone
             picture.encode(picture.advance(None).tiles, "rgb9e5")
             durations.append(time.perf_counter() - start_time)
-        while not picture.advance(None).exact or picture.next_job() is not None:
-            picture.run_next_job(lambda share: None, lambda: False)
+        run_until_exact(picture)
     return Figure(_FPS, 1 / float(np.median(durations)), "fps", {"size": list(size), "method": method})

@@ -37,6 +37,7 @@ from relume.store.bake_protocol import BakeMethod, Recipe
 from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.timing import seconds
+from relume_bench.until_exact import run_until_exact
 
 _CACHE_BYTES = 6 << 30  # default cache budget of a server
 _ACTIVE_POINTER = "/materials/Teapot/terms/1/params/nu"
@@ -112,11 +113,11 @@ def _measure_waits(method: BakeMethod, size: tuple[int, int], num_lights: int) -
             picture.advance(None)
         picture.encode(picture.all_tiles(), "rgb9e5")
         lit_s = time.perf_counter() - start_time
-        _run_until_exact(picture)
+        _encode_exact(picture)
         exact_s = time.perf_counter() - start_time
         shutil.rmtree(path / "derived")
         _prewarm(path, view)
-        prewarmed_s = seconds(lambda: _run_until_exact(_open_picture(path, view)[1]))
+        prewarmed_s = seconds(lambda: _encode_exact(_open_picture(path, view)[1]))
         rotated_s, exchanged_s = (_relit_s(transfer, picture, light) for light in (_TURNED, _EXCHANGED))
         _relit_s(transfer, picture, {})
         return _Waits(first_s, lit_s, exact_s, prewarmed_s, rotated_s, exchanged_s, _edit_ms(transfer, picture))
@@ -138,10 +139,9 @@ def _run_next_job(picture: Picture) -> None:
     picture.run_next_job(lambda share: None, lambda: False)
 
 
-def _run_until_exact(picture: Picture) -> None:
+def _encode_exact(picture: Picture) -> None:
     """Run all pending jobs, and encode the exact image."""
-    while not picture.advance(None).exact or picture.next_job() is not None:
-        _run_next_job(picture)
+    run_until_exact(picture)
     picture.encode(picture.all_tiles(), "rgb9e5")
 
 
@@ -150,13 +150,13 @@ def _relit_s(transfer: FixedViewTransfer, picture: Picture, light: dict[str, Any
     document = copy.deepcopy(transfer.default_look)
     document["environment"] |= light
     picture.set_look(validate(document, transfer.default_look))
-    return seconds(lambda: _run_until_exact(picture))
+    return seconds(lambda: _encode_exact(picture))
 
 
 def _edit_ms(transfer: FixedViewTransfer, picture: Picture) -> float:
     """Median frame time of a drag with a precomputed operator."""
     picture.prepare(_ACTIVE_POINTER)
-    _run_until_exact(picture)
+    _encode_exact(picture)
     durations = []
     for exponent in np.geomspace(20, 200, _EDITS):
         look = _sharpened(transfer, float(exponent))

@@ -27,9 +27,10 @@ from relume.scene.examples.cornell import GLOSSY_FLOOR, cornell_box
 from relume.scene.model import Scene
 from relume_bench import cycles, mitsuba
 from relume_bench.figure import Figure, skipped
-from relume_bench.gather import FLOOR, bake, edit_frames_s, make_recipe, open_exact_picture, run_until_exact
+from relume_bench.gather import FLOOR, bake, edit_frames_s, make_recipe, open_exact_picture
 from relume_bench.indirect import mitsuba_job, reflected, reflected_by_mitsuba
 from relume_bench.standard_error import compare_with_passes
+from relume_bench.until_exact import run_until_exact
 
 _NAMES = ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")
 

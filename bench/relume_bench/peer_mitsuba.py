@@ -36,6 +36,7 @@ from relume_bench.mitsuba import bsdf, missing, render
 from relume_bench.points import frame_radiance, sample_lit_surface
 from relume_bench.scenes import LAMBERT, cook_torrance, environments, teapot_on_table
 from relume_bench.standard_error import estimate_point_error
+from relume_bench.until_exact import run_until_exact
 
 _NAMES = ("peer.mitsuba_time_ratio",)
 _SIGMA, _CURVES = 0.2, ("theta_i", "theta_h")
@@ -90,7 +91,7 @@ def _time_relume_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[
         )
         picture = Picture(transfer, "front", Cache(4 << 30))
         picture.prepare("/materials/Teapot/terms/1/curves/theta_h")
-        _run_until_exact(picture)
+        run_until_exact(picture)
         edited_image = picture.image()
         durations = []
         for k in range(5 if tiny else 60):
@@ -102,9 +103,3 @@ def _time_relume_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[
             picture.encode(picture.advance(None).tiles, "rgb9e5")
             durations.append(time.perf_counter() - start_time)
     return float(np.median(durations[1:])), edited_image
-
-
-def _run_until_exact(picture: Picture) -> None:
-    while not picture.advance(None).exact or picture.next_job() is not None:
-        if picture.next_job() is not None:
-            picture.run_next_job(lambda share: None, lambda: False)

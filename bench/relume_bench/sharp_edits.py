@@ -31,8 +31,8 @@ from relume.scene.scene_folder import make_scene
 from relume_bench import sharp
 from relume_bench.background_jobs import BackgroundJobs
 from relume_bench.figure import Figure
-from relume_bench.gather import run_until_exact
 from relume_bench.timing import percentiles
+from relume_bench.until_exact import run_until_exact
 
 _POINTER = f"/materials/{sharp.MATERIAL}/terms/0/params/roughness"
 _FROM, _TO, _SLIDER = 0.3, 0.05, (0.6, 0.02)

@@ -40,6 +40,7 @@ from relume_bench.figure import Figure
 from relume_bench.points import freeze_for_curve, relative_rmse, sample_lit_surface
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 from relume_bench.timing import time_interleaved
+from relume_bench.until_exact import run_until_exact
 
 _NAMES = ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")
 _TERM = "/materials/Teapot/terms/1"
@@ -116,7 +117,7 @@ def _exact(transfer: FixedViewTransfer, drag: _Drag) -> list[NDArray[np.float32]
     for look in drag.looks(transfer):
         picture = Picture(transfer, "front", Cache(4 << 30))
         picture.set_look(look)
-        _run_until_exact(picture)
+        run_until_exact(picture)
         pictures.append(picture.image())
     return pictures
 
@@ -128,7 +129,7 @@ def _measure_drag(
     looks, is_edited = drag.looks(transfer), transfer.views["front"].material_ids() == 0
     picture = Picture(transfer, "front", Cache(4 << 30))
     picture.set_look(looks[0])
-    _run_until_exact(picture)
+    run_until_exact(picture)
     picture.prepare(f"{_TERM}/{touched}")
     while picture.next_job() is not None:  # a merged-light operator may come first
         picture.run_next_job(lambda share: None, lambda: False)
@@ -140,12 +141,6 @@ def _measure_drag(
         durations.append(time.perf_counter() - start_time)
         errors.append(relative_rmse(picture.image()[is_edited], right[is_edited]))
     return {"error": max(errors), "error_median": float(np.median(errors)), "ms": 1e3 * float(np.median(durations))}
-
-
-def _run_until_exact(picture: Picture) -> None:
-    while not picture.advance(None).exact or picture.next_job() is not None:
-        if picture.next_job() is not None:
-            picture.run_next_job(lambda share: None, lambda: False)
 
 
 def _freezes(tiny: bool, *drags: _Drag) -> tuple[float, dict[str, Any]]:

@@ -60,15 +60,7 @@ def measure(tiny: bool) -> list[Figure]:
         for name, noise in (("solve.error", 0.0), ("solve.error_noisy", _NOISE)):
             noisy = picture * (1.0 + noise * rng.standard_normal(picture.shape))
             lights_alone, with_materials = (
-                _error(
-                    start,
-                    render,
-                    render_whole,
-                    noisy.astype(np.float32),
-                    small,
-                    Path(folder),
-                    materials,
-                )
+                _error(start, render, render_whole, noisy.astype(np.float32), small, Path(folder), materials)
                 for materials in (frozenset[str](), _MATERIALS)
             )
             errors = {"noise": noise, "materials": sorted(_MATERIALS), "lights_alone": lights_alone}

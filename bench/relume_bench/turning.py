@@ -29,6 +29,7 @@ from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.timing import seconds
+from relume_bench.until_exact import run_until_exact
 
 _CACHE_BYTES = 4 << 30
 _POINTER = "/environment/rotation"
@@ -63,10 +64,10 @@ def _drag(method: BakeMethod, size: tuple[int, int], num_lights: int) -> _Turnin
         transfer = open_transfer(path, Cache(_CACHE_BYTES))
         picture = Picture(transfer, view, Cache(_CACHE_BYTES), is_watched=True)
         picture.prepare(_POINTER)
-        _run_until_exact(picture)
+        run_until_exact(picture)
         times = [seconds(partial(_turn, picture, transfer, angle)) for angle in range(10, 51, 10)]
         turned = picture.image()
-        exact_s = seconds(partial(_run_until_exact, picture))
+        exact_s = seconds(partial(run_until_exact, picture))
         return _Turning(float(np.median(times)), relative_rmse(turned, picture.image()), exact_s)
 
 
@@ -78,9 +79,3 @@ def _turn(picture: Picture, transfer: FixedViewTransfer, angle: float) -> None:
     picture.advance(None)
     picture.run_next_job(lambda share: None, lambda: False)
     picture.encode(picture.advance(None).tiles, "rgb9e5")
-
-
-def _run_until_exact(picture: Picture) -> None:
-    while not picture.advance(None).exact or picture.next_job() is not None:
-        if picture.next_job() is not None:
-            picture.run_next_job(lambda share: None, lambda: False)

@@ -52,11 +52,17 @@ def _normal_changes(view: View) -> Shaped[NDArray[np.float64], " materials"]:
     changes = []
     for material in range(len(view.bounds) - 1):
         pixel, first = np.unique(view.pixel[view.rows(material)], return_index=True)
-        normal = view.surface_points(material).normal[first]
+        normal = _normals(view, material)[first]
         is_adjacent = np.diff(pixel.astype(np.int64)) == 1
         squared = np.square(np.diff(normal, axis=0)[is_adjacent], dtype=np.float64).sum(axis=1)
         changes.append(max(_LEAST_CHANGE, float(np.sqrt(squared.mean())) if len(squared) else 0.0))
     return np.array(changes)
+
+
+def _normals(view: View, material: int) -> F32:
+    """Read the normals of a material's samples. (n, 3)"""
+    rows = view.rows(material)
+    return view.store.read(f"views/{view.index}/normal", rows.start, rows.stop)
 
 
 def one_per_block(view: View, material: int, block_size: int) -> Shaped[NDArray[np.intp], " blocks"]:
@@ -91,9 +97,7 @@ def nearest_chosen(
     """
     rows = view.rows(material)
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
-    scaled_normal = (
-        _BLOCKS_PER_NORMAL_UNIT * block_size * view.store.read(f"views/{view.index}/normal", rows.start, rows.stop)
-    )
+    scaled_normal = _BLOCKS_PER_NORMAL_UNIT * block_size * _normals(view, material)
     features = np.concatenate([x[:, None], y[:, None], scaled_normal], axis=1, dtype=np.float32)
     num_columns, num_rows = -(-view.width // block_size), -(-view.height // block_size)
     block_sample = np.full((num_rows, num_columns), -1, np.int32)
