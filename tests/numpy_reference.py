@@ -14,9 +14,12 @@ from relume.brdf.registry import TERMS
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality
 from relume.live.opened.patch_direct_light import DirectPatchLight
+from relume.live.opened.refined_environments import refine_environment
+from relume.look import BAKED_ENVIRONMENT
 from relume.radiosity.highlight_transport import outgoing_in_highlights
 from relume.radiosity.solve_bounces import solve_bounces
 from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility import trace_visibility
 from relume.transport.outgoing_patch_light import SIDE
 from relume.transport.projector import Projector
 from relume.transport.shading_points import ShadingPoints
@@ -181,7 +184,8 @@ def gather_incident_light(transfer, view: View, index, look):
     if EditAxis.LIGHT not in transfer.axes:  # a method with its own light
         samples = transfer.samples(view, index, transfer.cache)
         return transfer.incident_light(samples, light._replace(environment_gain=look.environment.gain))
-    lights, indirect = transfer.environment_lights(look.environment.key, LightQuality.EXACT), None
+    lights, receivers = trace_environment(transfer, view, index, look.environment.key)
+    indirect = None
     if light.paths.has_indirect:
         reflecting = transfer.patches.reflectance_operator(light.reflectances)
         patch_light = DirectPatchLight(
@@ -208,7 +212,25 @@ def gather_incident_light(transfer, view: View, index, look):
     local = transfer.local.rays_to(light, view.surface_points(index))
     direct_lights = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.empty()
     gather_rays = () if indirect is None else (replace(view.gather_rays(index), outgoing=indirect),)
-    return direct_lights, replace(view.receivers(index, is_lit=light.paths.direct), rays=(*gather_rays, *local))
+    return direct_lights, replace(receivers, rays=(*gather_rays, *local))
+
+
+def trace_environment(transfer, view: View, index, environment):
+    """Triangles of an environment and a material's samples: what the bake lacks is traced ray by ray."""
+    receivers = view.receivers(index)
+    if environment == BAKED_ENVIRONMENT:
+        return transfer.environment_lights(environment, LightQuality.EXACT), receivers
+    _, lights, new = refine_environment(transfer, environment)
+    if new is None:
+        return lights, receivers
+    points = receivers.points
+    bits = np.zeros((points.num_points, lights.num_lights), np.uint8)
+    baked = np.unpackbits(receivers.visible, axis=1, count=transfer.lights.num_lights, bitorder="little")
+    bits[:, : baked.shape[1]] = baked
+    ray_args = transfer.local.embree, points.position, points.normal, lights.direction[new.tile], points.alpha_sample
+    traced = trace_visibility(*ray_args).visible
+    bits[:, new.tile] = np.unpackbits(traced, axis=1, count=len(new.tile), bitorder="little")
+    return lights, replace(receivers, visible=np.packbits(bits, axis=1, bitorder="little"))
 
 
 def trace_lobe_light(transfer, view: View, index, look, lobe):

@@ -20,7 +20,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
 from relume.core.thread_pools import num_threads
 from relume.lights.light_clusters import cluster_lights, num_clusters
-from relume.lights.sphere_tiles import choose_tiles
+from relume.lights.tile_subdivision import choose_tiles
 from relume.math.daubechies import analysis
 from relume_bench.figure import Figure
 from relume_bench.points import LitSamples, freeze_for_curve, relative_rmse, sample_lit_surface

@@ -14,8 +14,9 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
 from relume.core.jackknife import JackknifeEstimate
-from relume.lights.sphere_tiles import Tiles, choose_tiles
+from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
+from relume.lights.tile_subdivision import choose_tiles
 from relume.operators.shade import shade
 from relume.raytrace.visibility import trace_visibility
 from relume.reference import environment_texels, reference_radiance

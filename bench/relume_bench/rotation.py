@@ -12,7 +12,7 @@ import numpy as np
 
 from relume.assets.environments.environment import Environment
 from relume.core.jackknife import JackknifeEstimate
-from relume.lights.sphere_tiles import MIN_LIGHTS
+from relume.lights.tile_subdivision import MIN_LIGHTS
 from relume_bench.figure import Figure
 from relume_bench.points import sample_lit_surface
 from relume_bench.relighting import bake, compare, documents, figures

@@ -6,7 +6,7 @@ As `relume_bench.rotation`. The context also has a new bake of each map.
 from __future__ import annotations
 
 from relume.core.jackknife import JackknifeEstimate
-from relume.lights.sphere_tiles import MIN_LIGHTS
+from relume.lights.tile_subdivision import MIN_LIGHTS
 from relume_bench.figure import Figure
 from relume_bench.points import sample_lit_surface
 from relume_bench.relighting import bake, compare, documents, figures

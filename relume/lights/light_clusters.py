@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from relume.core.color import luminance
 from relume.core.numba_options import NO_REFCOUNT
-from relume.lights.sphere_tiles import SOLID_ANGLE_EXPONENT, UNIFORM_FRACTION, Tiles
+from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import MergedParts, TriangleLights, merge_clusters
 from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
+from relume.lights.tile_subdivision import SOLID_ANGLE_EXPONENT, UNIFORM_FRACTION
 
 F64 = NDArray[np.float64]
 Codes = NDArray[np.uint64]

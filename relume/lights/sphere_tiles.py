@@ -1,12 +1,10 @@
 """Spherical triangles that tile the sphere: leaves of a hierarchy over an octahedron.
 
-Ben-Artzi 2006, section 5.2: each triangle is split into four at its edges' midpoints where the metric of structured
-importance sampling (Agarwal 2003, L · ΔΩ^b) is largest.
+Each triangle is split into four at its edges' midpoints, see `relume.lights.tile_subdivision`.
 """
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,26 +13,13 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.environments.equirect import texel_directions, texel_solid_angles
-from relume.core.color import luminance
-from relume.core.errors import PlanError
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-MIN_LIGHTS, MAX_LIGHTS = 8, 65_536
 MAX_DEPTH = 28  # of the hierarchy: capacity of a 64-bit code
-
-# Agarwal 2003 uses ΔΩ^(1/4) against errors of shadows; highlights show the map itself, so that the size has more weight
-# here, and a small term of plain solid angle is added, weighted by the mean radiance
-# (docs/direct-light.md#environment-triangles).
-SOLID_ANGLE_EXPONENT = 0.4
-UNIFORM_FRACTION = 1e-2
-# With light at any azimuth, a larger fraction of tiles is dim until a bright region is rotated there
-# (docs/direct-light.md#environment-triangles).
-_RELIGHTABLE_UNIFORM_FRACTION = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
 # counterclockwise from outside, as are all descendants; in the order of the signs of x, y, z
@@ -121,7 +106,7 @@ class Tiles:
                 children[k] = index[node]
             else:
                 children[k] = [index[4 * node + child] for child in range(4)]
-        return _middle_edges(_corners(np.array(nodes, np.uint64))), children
+        return middle_edges(_corners(np.array(nodes, np.uint64))), children
 
 
 def _corners(codes: NDArray[np.uint64]) -> F64:
@@ -131,11 +116,11 @@ def _corners(codes: NDArray[np.uint64]) -> F64:
     for level in range(int(levels.max(initial=0))):
         deeper = np.nonzero(levels > level)[0]
         child = (codes[deeper] >> 2 * (levels[deeper] - level - 1)) & 3
-        corners[deeper] = _children(corners[deeper])[np.arange(len(deeper)), child]
+        corners[deeper] = children_of(corners[deeper])[np.arange(len(deeper)), child]
     return corners
 
 
-def _children(corners: F64) -> F64:
+def children_of(corners: F64) -> F64:
     """Return the corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
     six_points = np.concatenate([corners, _middles(corners)], axis=1)
     return np.asarray(six_points[:, _CHILDREN], np.float64)
@@ -146,14 +131,14 @@ def _middles(corners: F64) -> F64:
     return unit(corners + corners[:, (1, 2, 0)])
 
 
-def _middle_edges(corners: F64) -> F64:
+def middle_edges(corners: F64) -> F64:
     """Return the normals of the edges of middle children, each toward the corner that it cuts off. (n, 3, 3)"""
     middles = _middles(corners)
     return np.cross(middles, middles[:, (2, 0, 1)])
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _child(d, edges):  # type: ignore[no-untyped-def]
+def child_at(d, edges):  # type: ignore[no-untyped-def]
     """Return the child that contains a direction: 0, 1, 2 at the corners, 3 in the middle.
 
     The middle child's three edges decide: outside edge k means child k. Every direction gets exactly one child, even
@@ -171,72 +156,5 @@ def _locate(directions, edges, children, start, stop, tile_index):  # type: igno
         d = directions[n]
         node = 4 * (d[0] >= 0) + 2 * (d[1] >= 0) + (d[2] >= 0)
         while node >= 0:
-            node = children[node, _child(d, edges[node])]
+            node = children[node, child_at(d, edges[node])]
         tile_index[n] = -1 - node
-
-
-@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _find_children(texels, directions, edges, child_index):  # type: ignore[no-untyped-def]
-    for k in range(texels.shape[0]):
-        child_index[k] = _child(directions[texels[k]], edges)
-
-
-class _Subdivision:
-    """The growing hierarchy: a heap of leaves by metric."""
-
-    def __init__(self, radiance: F32, uniform_fraction: float) -> None:
-        height, width, _ = radiance.shape
-        self.directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
-        self.solid_angles = np.repeat(texel_solid_angles(height, width), width)
-        self.luminous = luminance(radiance.reshape(-1, 3)).astype(np.float64) * self.solid_angles
-        self.uniform = uniform_fraction * float(self.luminous.sum()) / (4 * np.pi)
-        self.heap: list[tuple[float, int, int, F64, NDArray[np.int64]]] = []
-        self.count = 0
-        sign = (self.directions >= 0).astype(np.int64)
-        octant = sign[:, 0] * 4 + sign[:, 1] * 2 + sign[:, 2]
-        for k in range(8):
-            self._push(8 + k, _OCTAHEDRON[_OCTANTS[k]], np.nonzero(octant == k)[0])
-
-    def _push(self, code: int, corners: F64, texels: NDArray[np.int64]) -> None:
-        light = float(self.luminous[texels].sum())
-        extent = float(self.solid_angles[texels].sum())
-        metric = light * max(extent, 1e-12) ** SOLID_ANGLE_EXPONENT + self.uniform * extent
-        # leaves with fewer than two texels have no more detail: last in the queue
-        can_split = len(texels) > 1 and code.bit_length() < 4 + 2 * MAX_DEPTH
-        heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, corners, texels))
-        self.count += 1
-
-    def split_largest(self) -> bool:
-        """Replace the leaf of largest metric by its four children; return False if none can be split."""
-        if self.heap[0][0] == 0.0:
-            return False
-        _, _, code, corners, texels = heapq.heappop(self.heap)
-        child_index = np.empty(len(texels), np.int8)
-        _find_children(texels, self.directions, _middle_edges(corners[None])[0], child_index)
-        for child, child_corners in enumerate(_children(corners[None])[0]):
-            self._push(4 * code + child, child_corners, texels[child_index == child])
-        return True
-
-
-def choose_tiles(radiance: Shaped[F32, "height width 3"], num_lights: int, relightable: bool = False) -> Tiles:
-    """Divide the sphere into about `num_lights` triangles (the next count of the form 8 + 3k, or fewer).
-
-    O(texels · depth) time.
-
-    Args:
-        radiance: equirectangular, top row first. num_lights: in [8, 65536].
-        relightable: the environment will be rotated or exchanged: divide rings about +Y uniformly, by their mean.
-    Raises:
-        PlanError: `num_lights` outside [8, 65536].
-    """
-    if not MIN_LIGHTS <= num_lights <= MAX_LIGHTS:
-        raise PlanError(f"{num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
-    if relightable:
-        ring = radiance.mean(axis=1, keepdims=True, dtype=np.float64).astype(np.float32)
-        tree = _Subdivision(np.broadcast_to(ring, radiance.shape), _RELIGHTABLE_UNIFORM_FRACTION)
-    else:
-        tree = _Subdivision(radiance, UNIFORM_FRACTION)
-    while len(tree.heap) + 3 <= num_lights and tree.split_largest():
-        pass
-    leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbors together
-    return Tiles(np.array([leaf[2] for leaf in leaves], np.uint64))

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from relume.assets.environments.equirect import rotate_about_y, texel_directions, texel_solid_angles
 from relume.core.color import luminance
 from relume.lights.light_moments import LightTexels, compute_moments
-from relume.lights.sphere_tiles import Tiles, choose_tiles, solid_angles, unit
+from relume.lights.sphere_tiles import Tiles, solid_angles, unit
 from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
+from relume.lights.tile_subdivision import choose_tiles
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -41,8 +41,8 @@ from relume.camera.specular_hits import MAX_MIRROR_BOUNCES
 from relume.camera.transparency_layers import has_layers
 from relume.camera.view_samples import BACKGROUND, camera_setup, sample_pixels
 from relume.core.errors import PlanError
-from relume.lights.sphere_tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
+from relume.lights.tile_subdivision import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.methods import plan_estimates
 from relume.methods.read_cache import ReadCache
 from relume.methods.store_layout import SHARD_ROWS, light_members_path, read_lights, read_shadow_ray_directions

@@ -19,7 +19,7 @@ from relume.assets.environments.equirect import lookup, rotate_about_y
 from relume.camera.specular_hits import is_mirror_material
 from relume.camera.view_samples import BACKGROUND, ViewSamples, sample_view
 from relume.core.errors import CancelledError
-from relume.lights.sphere_tiles import MIN_LIGHTS
+from relume.lights.tile_subdivision import MIN_LIGHTS
 from relume.look import LightPaths, Look
 from relume.methods.direct import DirectMethod
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers

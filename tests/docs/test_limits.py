@@ -15,7 +15,7 @@ from relume.camera.tiling import TILE_SIZE
 from relume.camera.view_samples import view_sample_limit
 from relume.image_io import decode as images
 from relume.images import read_image
-from relume.lights import sphere_tiles
+from relume.lights.tile_subdivision import MAX_LIGHTS
 from relume.look import document, patch
 from relume.methods import plan_estimates
 from relume.methods import view_stages as direct
@@ -61,7 +61,7 @@ ROWS = {
         f"{IES_FILES.max_entries:,}; {read_ies.MAX_FILE_BYTES // MILLION} MB; {read_ies.MAX_ANGLES:,} of each kind"
     ),
     "imported measured materials": f"{materials.STORE.max_entries}",
-    "pixels of a baked view; environment triangles of a bake": f"{direct.MAX_PIXELS:,}; {sphere_tiles.MAX_LIGHTS:,}",
+    "pixels of a baked view; environment triangles of a bake": f"{direct.MAX_PIXELS:,}; {MAX_LIGHTS:,}",
     "points of a curve": f"{terms.MAX_POINTS:,}",
     "operations of a patch; text message of a session": (
         f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"

@@ -10,8 +10,9 @@ from relume.assets.environments.equirect import halve_to_width, texel_directions
 from relume.core.color import luminance
 from relume.core.errors import PlanError
 from relume.lights.light_moments import F64, LightTexels, compute_moments
-from relume.lights.sphere_tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
+from relume.lights.sphere_tiles import MAX_DEPTH, Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment, tessellate_environment
+from relume.lights.tile_subdivision import MAX_LIGHTS, choose_tiles
 
 
 def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:

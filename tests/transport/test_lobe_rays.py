@@ -17,8 +17,8 @@ from relume.brdf.registry import TERMS
 from relume.brdf.roughness_levels import NO_LEVELS
 from relume.brdf.term import Angle
 from relume.brdf.term_validation import complete_term
-from relume.lights.sphere_tiles import choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
+from relume.lights.tile_subdivision import choose_tiles
 from relume.live.opened.lobe_light import lobe_environment, tile_of_texels
 from relume.math.zernike import basis_functions
 from relume.raytrace.lobe_directions import make_lobe_pattern

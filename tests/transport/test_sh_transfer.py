@@ -9,8 +9,8 @@ from session_edits import relative_rmse
 
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.lights.frequency_split import split_frequencies
-from relume.lights.sphere_tiles import choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
+from relume.lights.tile_subdivision import choose_tiles
 from relume.math.local_pca import leading_components
 from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
 from relume.math.zernike import basis_functions, num_functions

@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # a server that only describes its API loads no kernels
     from relume.look.object_materials import ObjectMaterials
     from relume.operators.image_cache import ImageFiles
     from relume.raytrace.moving_light import MovingLight
+    from relume.raytrace.new_tiles import NewTiles
     from relume.raytrace.surface_points import SurfacePoints
     from relume.scene.model import Camera
     from relume.store.bake_protocol import StoreReader
@@ -84,8 +85,18 @@ class Samples(Protocol):
         """Memory that they take."""
         ...
 
-    def receivers(self, *, is_lit: bool) -> ShadingPoints:
-        """Return the points without rays. is_lit: with the visibility of the environment."""
+    def receivers(
+        self, *, is_lit: bool, new_tiles: NewTiles | None = None, is_canceled: Callable[[], bool] = lambda: False
+    ) -> ShadingPoints:
+        """Return the points without rays.
+
+        Args:
+            is_lit: with the visibility of the environment.
+            new_tiles: of the environment whose visibility is not baked but traced; None for none.
+            is_canceled: polled while it is traced.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
         ...
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:

@@ -56,6 +56,7 @@ from relume.live.opened.lobe_light import (
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.object_material_store import ObjectMaterialStore
 from relume.live.opened.own_images import OwnImages
+from relume.live.opened.refined_environments import RefinedEnvironment, refine_environment
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
@@ -286,7 +287,7 @@ class BakedFixedViews:
     def unoccluded_samples(self, points: SurfacePoints) -> Samples:
         """Return points to which nothing occludes the environment. See `FixedViewTransfer`."""
         visible = np.packbits(points.normal @ self.shadow_ray_directions.T > 0, axis=1, bitorder="little")
-        return SelectedSamples(ShadingPoints(points, points.normal, visible), self.local)
+        return SelectedSamples(ShadingPoints(points, points.normal, visible), self.local, is_occluded=False)
 
     def incident_light(
         self,
@@ -298,8 +299,13 @@ class BakedFixedViews:
         patch_light: Illumination | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at samples. See `FixedViewTransfer`."""
-        lights = self.direct_lights(light, quality if lobe is None else LightQuality.EXACT)
-        receivers = self._linked(samples.receivers(is_lit=lights.num_lights > 0), light)
+        if lobe is not None or quality is LightQuality.EXACT:
+            environment = self._refined(light.environment.unlinked)
+            lights, new_tiles = displayed_of(environment.lights, light), environment.new
+        else:
+            lights, new_tiles = self.direct_lights(light, quality), None
+        receivers = samples.receivers(is_lit=lights.num_lights > 0, new_tiles=new_tiles, is_canceled=is_canceled)
+        receivers = self._linked(receivers, light)
         rays: list[RayList] = []
         if lobe is not None:
             lights, receivers = self._share_with_rays(lights.ungrouped(), receivers, light, lobe)
@@ -310,6 +316,12 @@ class BakedFixedViews:
         followed = self._followed_materials(light) if lobe is not None and lobe.is_narrow.all() else ()
         rays += [*self._mirror_rays(samples, light, followed), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
+
+    def _refined(self, environment: EnvironmentKey) -> RefinedEnvironment:
+        """Return the tiles in which samples show an environment exactly, and its light in them."""
+        if environment == BAKED_ENVIRONMENT:
+            return RefinedEnvironment(self.tiles, self.lights, None)
+        return refine_environment(self, environment)
 
     def _linked(self, receivers: ShadingPoints, light: Illumination) -> ShadingPoints:
         """Return receivers whose visibility is zero where the environment does not light the surface."""
@@ -339,7 +351,7 @@ class BakedFixedViews:
 
     def _shared_triangles(self, light: Illumination, lobe: LobeSampling) -> NDArray[np.intp]:
         """Return the triangles that share their light with rays: all, if wide levels have no rays."""
-        lights = self.environment_lights(light.environment, LightQuality.EXACT)
+        lights = self._refined(light.environment.unlinked).lights
         return bright_triangles(lights) if lobe.is_narrow.all() else np.arange(lights.num_lights)
 
     def _lobe_rays(
@@ -424,19 +436,24 @@ class BakedFixedViews:
     def _lobe_environment(self, light: Illumination, shared: NDArray[np.intp]) -> tuple[LobeEnvironment, LobePeaks]:
         """Return the environment for lobe rays. shared: triangles that share their light with them"""
         key, rotation = light.environment.unlinked, light.environment.rotation
-        radiance, lights = self.environment_map(key.map), self.environment_lights(key, LightQuality.EXACT)
-        tile = self.cache.get_value(
-            (self.key, "tile of texels", key), lambda: tile_of_texels(self.tiles, radiance.shape[:2], rotation)
-        )
+        radiance, refined = self.environment_map(key.map), self._refined(key)
+
+        def tiles_of_texels(tiles: Tiles) -> NDArray[np.int32]:
+            texel_args = radiance.shape[:2], rotation
+            return self.cache.get_value(
+                (self.key, "tile of texels", key, len(tiles.codes)), lambda: tile_of_texels(tiles, *texel_args)
+            )
+
         is_direct = light.paths.direct
 
         def compute() -> tuple[LobeEnvironment, LobePeaks]:
             gain = np.array(light.environment_gain, np.float32)
             weighted = radiance if np.all(gain == 1) else radiance * gain
-            peaks, irradiance, without_peaks = choose_peaks(weighted, tile, lights)
-            map_args = weighted, tile, rotation, lights, without_peaks, shared
+            baked = self.environment_lights(key, LightQuality.EXACT)  # in tiles that patches see or do not
+            peaks, irradiance, without_peaks = choose_peaks(weighted, tiles_of_texels(self.tiles), baked)
+            map_args = weighted, tiles_of_texels(refined.tiles), rotation, refined.lights, without_peaks, shared
             environment = lobe_environment(*map_args, is_direct=is_direct)
-            return environment, LobePeaks(lights.direction[peaks], irradiance, self._patch_visibility(peaks))
+            return environment, LobePeaks(baked.direction[peaks], irradiance, self._patch_visibility(peaks))
 
         cache_key = self.key, "lobe environment", key, light.environment_gain, is_direct, len(shared)
         return self.cache.transient.get_value(cache_key, compute)

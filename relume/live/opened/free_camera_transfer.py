@@ -390,8 +390,8 @@ class BakedFreeCamera:
         """Return the radiance of white probes under the whole environment, per distinct normal. (n, 3) float32"""
         _, first, normal_index = np.unique(probes.normal, axis=0, return_index=True, return_inverse=True)
         quality = LightQuality.PREVIEW if is_preview else LightQuality.EXACT
-        samples = self.light_transport.unoccluded_samples(probes.rows(first))
-        lights, receivers = self.light_transport.incident_light(samples, direct_environment(light), quality)
+        receivers = self.light_transport.unoccluded_samples(probes.rows(first)).receivers(is_lit=True)
+        lights = self.light_transport.direct_lights(direct_environment(light), quality)
         # the first function is constant: its coefficient is proportional to the irradiance
         constant = incident_coefficients(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
         return np.asarray(constant[normal_index.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)

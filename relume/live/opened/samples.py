@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Shaped
@@ -13,6 +13,7 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.look import LightGeometry
+from relume.raytrace.new_tiles import NewTiles
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.lobe_hits import NO_FOOTPRINT, LobeHits
 from relume.transport.shading_points import GatherRays, LocalRays, ShadingPoints
@@ -20,6 +21,7 @@ from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
+Bits = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -39,9 +41,19 @@ class MaterialSamples:
 
     num_bytes = 0
 
-    def receivers(self, *, is_lit: bool) -> ShadingPoints:
-        """Read the samples without rays. is_lit: with the visibility of the environment."""
-        return self.view.receivers(self.material, is_lit=is_lit)
+    def receivers(
+        self, *, is_lit: bool, new_tiles: NewTiles | None = None, is_canceled: Callable[[], bool] = lambda: False
+    ) -> ShadingPoints:
+        """Read the samples without rays; the visibility of new tiles is cached. See `Samples`."""
+        receivers = self.view.receivers(self.material, is_lit=is_lit)
+        if new_tiles is None or not is_lit:
+            return receivers
+
+        def trace() -> Bits:
+            return new_tiles.trace(self.local.embree, receivers.points, receivers.visible, is_canceled)
+
+        key = *self.key, "visibility", new_tiles.key
+        return replace(receivers, visible=self.cache.transient.get_value(key, trace))
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays:
         """Read the gather rays, without light; missing ones are traced."""
@@ -89,12 +101,16 @@ class SelectedSamples:
         points: without rays. local: casts the shadows of local lights.
         stored_rays: their gather rays without light; None for none.
         mirror_visibility: the virtual lights that they see in planar mirrors; None for none.
+        source: samples whose visibility they have, and which of these; None: their own.
+        is_occluded: the scene occludes the environment, as far as its shadows must be traced.
     """
 
     points: ShadingPoints
     local: LocalLights
     stored_rays: GatherRays | None = None
     mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
+    source: tuple[SelectedSamples, Shaped[NDArray[np.intp], " n"]] | None = None
+    is_occluded: bool = True
 
     @property
     def num_bytes(self) -> int:
@@ -104,9 +120,20 @@ class SelectedSamples:
             2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
         )
 
-    def receivers(self, *, is_lit: bool) -> ShadingPoints:
-        """Return the points without rays."""
-        return self.points
+    def receivers(
+        self, *, is_lit: bool, new_tiles: NewTiles | None = None, is_canceled: Callable[[], bool] = lambda: False
+    ) -> ShadingPoints:
+        """Return the points without rays. See `Samples`."""
+        if new_tiles is None or not is_lit:
+            return self.points
+        if self.source is not None:
+            source, rows = self.source
+            lit = source.receivers(is_lit=is_lit, new_tiles=new_tiles, is_canceled=is_canceled)
+            return replace(self.points, visible=lit.visible[rows])
+        points, baked = self.points.points, self.points.visible
+        if not self.is_occluded:
+            return replace(self.points, visible=new_tiles.unoccluded(points, baked))
+        return replace(self.points, visible=new_tiles.trace(self.local.embree, points, baked, is_canceled))
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
         """Return the gather rays, without light."""

@@ -115,4 +115,5 @@ def _move(samples: SelectedSamples, found: PixelPoints) -> SelectedSamples:
     points = found.points._replace(alpha_sample=parent.points.alpha_sample)
     mirrors = None if samples.mirror_visibility is None else samples.mirror_visibility[found.sample]
     shading_points = replace(parent, points=points, wo=found.wo)
-    return replace(samples, points=shading_points, stored_rays=None, mirror_visibility=mirrors)
+    source = samples, found.sample
+    return replace(samples, points=shading_points, stored_rays=None, mirror_visibility=mirrors, source=source)

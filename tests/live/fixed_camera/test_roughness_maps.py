@@ -12,6 +12,7 @@ from tiny_scenes import corner
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError
 from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.openers import open_transfer
 from relume.methods.registry import METHODS
@@ -197,7 +198,12 @@ def test_a_moved_light_is_followed(gather, monkeypatch) -> None:
     assert relative_rmse(followed, exact) < 0.1
     assert np.median(np.abs(followed - exact) / exact) < 0.005
     with monkeypatch.context() as patch:  # the error of everything else, over the same seeds: 0.015 to 0.021
-        patch.setattr(IndirectSolver, "exact", lambda solver, light: isotropic(solver.preview(light)))
+        outgoing_light = IndirectSolver.outgoing_light
+
+        def without_direction(solver, light, *_):
+            return isotropic(outgoing_light(solver, light, LightQuality.PREVIEW))
+
+        patch.setattr(IndirectSolver, "outgoing_light", without_direction)
         change = render_uncached(gather, after) - render_uncached(gather, before)
     assert relative_rmse(followed, exact_image(gather, before) + change) < 0.025
     assert relative_rmse(run_until_exact(picture).image(), exact) < 1e-4

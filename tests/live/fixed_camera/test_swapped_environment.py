@@ -32,8 +32,8 @@ def scene_under(radiance):
     return make_scene("other", scene.meshes, scene.materials, scene.cameras, light)
 
 
-def baked(scene, folder, relightable=False):
-    recipe = Recipe("direct", ("front",), SIZE, 1000, relightable)
+def baked(scene, folder):
+    recipe = Recipe("direct", ("front",), SIZE, 1000)
     return open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder), Cache(1 << 30))
 
 
@@ -93,16 +93,11 @@ def test_the_scenes_own_map_from_the_library_changes_nothing(plain, library, tmp
     assert relative_rmse(images[1], images[0]) < 1e-5
 
 
-def test_a_relightable_bake_is_nearer_to_a_fresh_one_than_a_plain_bake(plain, map_name, tmp_path):
+def test_a_bake_in_another_environment_is_near_a_fresh_one(plain, map_name, tmp_path):
     fresh = baked(scene_under(dusk()), tmp_path / "fresh.zarr")
     expected = render_image(fresh, "front", make_look(fresh))
-    relightable = baked(still_life(), tmp_path / "relightable.zarr", relightable=True)
-    errors = [
-        relative_rmse(render_image(transfer, "front", make_look(transfer, under(map_name))), expected)
-        for transfer in (plain, relightable)
-    ]
-    assert errors[1] < errors[0]
-    assert errors[1] < 0.05
+    # 0.0005; without new tiles 0.03
+    assert relative_rmse(render_image(plain, "front", make_look(plain, under(map_name))), expected) < 0.002
 
 
 def test_the_reference_uses_the_swapped_map(map_name):
