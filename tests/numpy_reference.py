@@ -12,10 +12,8 @@ from relume.brdf.evaluate import angles_numpy
 from relume.brdf.lobe_sampling import sample_lobe
 from relume.brdf.registry import TERMS
 from relume.live.fixed_camera.illumination import illumination_from_look
-from relume.live.fixed_camera.protocols import EditAxis, LightQuality
+from relume.live.fixed_camera.protocols import EditAxis
 from relume.live.opened.patch_direct_light import DirectPatchLight
-from relume.live.opened.refined_environments import refine_environment
-from relume.look import BAKED_ENVIRONMENT
 from relume.radiosity.highlight_transport import outgoing_in_highlights
 from relume.radiosity.solve_bounces import solve_bounces
 from relume.raytrace.surface_points import SurfacePoints
@@ -217,19 +215,14 @@ def gather_incident_light(transfer, view: View, index, look):
 
 def trace_environment(transfer, view: View, index, environment):
     """Triangles of an environment and a material's samples: what the bake lacks is traced ray by ray."""
-    receivers = view.receivers(index)
-    if environment == BAKED_ENVIRONMENT:
-        return transfer.environment_lights(environment, LightQuality.EXACT), receivers
-    _, lights, new = refine_environment(transfer, environment)
-    if new is None:
-        return lights, receivers
-    points = receivers.points
+    receivers, (_, lights, unbaked) = view.receivers(index), transfer.refined_environment(environment)
+    points, directions = receivers.points, lights.direction[unbaked]
+    ray_args = transfer.local.embree, points.position, points.normal, directions, points.alpha_sample
     bits = np.zeros((points.num_points, lights.num_lights), np.uint8)
     baked = np.unpackbits(receivers.visible, axis=1, count=transfer.lights.num_lights, bitorder="little")
     bits[:, : baked.shape[1]] = baked
-    ray_args = transfer.local.embree, points.position, points.normal, lights.direction[new.tile], points.alpha_sample
     traced = trace_visibility(*ray_args).visible
-    bits[:, new.tile] = np.unpackbits(traced, axis=1, count=len(new.tile), bitorder="little")
+    bits[:, unbaked] = np.unpackbits(traced, axis=1, count=len(unbaked), bitorder="little")
     return lights, replace(receivers, visible=np.packbits(bits, axis=1, bitorder="little"))
 
 

@@ -1,4 +1,4 @@
-"""Bakes with replaced light: tiles and shadow rays unchanged, power and moments from another map."""
+"""Bakes with replaced light, in tiles refined for it as in a picture."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from relume.brdf.curves import curve_bands
 from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
 from relume.core.jackknife import JackknifeEstimate
+from relume.lights.refined_environment import RefinedEnvironment, environment_metric, refine_environment
 from relume.lights.sphere_tiles import Tiles
-from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
 from relume.lights.tile_subdivision import choose_tiles
 from relume.operators.shade import shade
 from relume.raytrace.visibility import trace_visibility
@@ -36,10 +37,11 @@ def documents(kind: str) -> dict[str, dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Bake:
-    """Tiles, and the directions of their shadow rays."""
+    """Tiles, the directions of their shadow rays, and their metric, see `environment_metric`."""
 
     tiles: Tiles
-    towards: NDArray[np.float32]
+    ray_directions: NDArray[np.float32]
+    metric: float
 
 
 def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
@@ -49,14 +51,12 @@ def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
         environment: to bake. num_lights: minimum number of tiles.
         relightable: tiles are independent of the light, and shadow rays go to their centers.
     """
-    tiles = choose_tiles(environment.radiance, num_lights, relightable)
-    centroids = tiles.centroids.astype(np.float32)
-    return Bake(
-        tiles,
-        centroids
-        if relightable
-        else integrate_environment(tiles, EnvironmentTexels.from_radiance(environment.radiance)).direction,
-    )
+    texels = EnvironmentTexels.from_radiance(environment.radiance)
+    own = tiles = choose_tiles(environment.radiance, num_lights, relightable)
+    directions = integrate_environment(tiles, texels).direction
+    if relightable:
+        own, directions = choose_tiles(environment.radiance, num_lights), tiles.centroids.astype(np.float32)
+    return Bake(tiles, directions, environment_metric(own, texels))
 
 
 def compare(
@@ -83,17 +83,21 @@ def compare(
     )
     errors = {}
     for kind, baked in bakes.items():
-        lights = integrate_environment(baked.tiles, EnvironmentTexels.from_radiance(light.radiance))
+        texels = EnvironmentTexels.from_radiance(light.radiance)
+        refined = refine_environment(baked.tiles, baked.ray_directions, texels, 0.0, baked.metric)
         for (name, document), right in zip(terms.items(), reference, strict=True):
-            errors[name, kind] = estimate_point_error(_radiance(lit_samples, baked, lights, document), right)
+            errors[name, kind] = estimate_point_error(_radiance(lit_samples, baked, refined, document), right)
     return errors
 
 
-def _radiance(lit_samples: LitSamples, baked: Bake, lights: TriangleLights, document: Mapping[str, Any]) -> F64:
-    """Radiance of the points under the lights in a bake's tiles. (n, 3)"""
-    surface_points, term = lit_samples.surface_points, TERMS[document["model"]]
+def _radiance(lit_samples: LitSamples, baked: Bake, refined: RefinedEnvironment, document: Mapping[str, Any]) -> F64:
+    """Radiance of the points under an environment in a bake's tiles, as far as they are not refined. (n, 3)"""
+    surface_points, term, lights = lit_samples.surface_points, TERMS[document["model"]], refined.lights
+    directions = lights.direction.copy()
+    directions[: len(baked.ray_directions)] = baked.ray_directions
+    directions[refined.unbaked] = lights.direction[refined.unbaked]
     visible = trace_visibility(
-        lit_samples.geometry.embree, surface_points.position, surface_points.normal, baked.towards
+        lit_samples.geometry.embree, surface_points.position, surface_points.normal, directions
     ).visible
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
     receivers = replace(lit_samples.receivers, visible=visible)
@@ -103,11 +107,11 @@ def _radiance(lit_samples: LitSamples, baked: Bake, lights: TriangleLights, docu
 
 
 def figures(errors_by_name: Mapping[str, Mapping[str, JackknifeEstimate]], context: Mapping[str, Any]) -> list[Figure]:
-    """Each figure's worst error of a relightable bake; all errors, labeled "kind, …", in the context."""
+    """Each figure's worst error of a plain bake; all errors, labeled "kind, …", in the context."""
     results = []
     for name, errors in errors_by_name.items():
-        worst, plain = _worst(errors, "relightable"), _worst(errors, "plain")
-        details = {"plain": plain.value, "plain_standard_error": plain.standard_error}
+        worst, relightable = _worst(errors, "plain"), _worst(errors, "relightable")
+        details = {"relightable": relightable.value, "relightable_standard_error": relightable.standard_error}
         values_by_label = {label: error.value for label, error in errors.items()}
         results.append(
             Figure(name, worst.value, "relative RMSE", {**context, **details, **values_by_label}, worst.standard_error)

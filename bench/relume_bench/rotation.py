@@ -1,7 +1,7 @@
 """accuracy.rotation_*: error of a bake with a rotated environment; the worst of the rotations and maps.
 
-Tiles and shadow rays are unchanged, power and moments of the light in each tile are those of the rotated map. The
-context has the same for a bake that is not relightable, and for a new bake of the rotated map.
+Tiles are refined for the rotated map as in a picture. The context has the same for a relightable bake, and for a new
+bake of the rotated map.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Visibility of tiles of an environment that a bake does not have."""
+"""Visibility of an environment's tiles, as far as a bake does not have it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class NewTiles(NamedTuple):
     """The tiles of a refined environment whose visibility is not baked.
 
     Attributes:
-        key: identifies them. num_lights: number of all tiles. tile: indices of the new ones.
+        key: identifies them. num_lights: number of all tiles. tile: indices of these.
         direction: unit, of their shadow rays.
     """
 

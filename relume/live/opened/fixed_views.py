@@ -25,8 +25,10 @@ from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.prefilter import downsampled, prefiltered
+from relume.lights.refined_environment import RefinedEnvironment, environment_metric, refine_environment
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
+from relume.lights.tile_subdivision import choose_tiles
 from relume.live.fixed_camera.illumination import (
     Illumination,
     emission_images,
@@ -56,7 +58,6 @@ from relume.live.opened.lobe_light import (
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.object_material_store import ObjectMaterialStore
 from relume.live.opened.own_images import OwnImages
-from relume.live.opened.refined_environments import RefinedEnvironment, refine_environment
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
@@ -66,6 +67,7 @@ from relume.look.object_materials import ObjectMaterials
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.new_tiles import NewTiles
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility import select_visibility
@@ -300,8 +302,8 @@ class BakedFixedViews:
     ) -> LightsAndPoints:
         """Return the incident light at samples. See `FixedViewTransfer`."""
         if lobe is not None or quality is LightQuality.EXACT:
-            environment = self._refined(light.environment.unlinked)
-            lights, new_tiles = displayed_of(environment.lights, light), environment.new
+            key = light.environment.unlinked
+            lights, new_tiles = displayed_of(self.refined_environment(key).lights, light), self._new_tiles(key)
         else:
             lights, new_tiles = self.direct_lights(light, quality), None
         receivers = samples.receivers(is_lit=lights.num_lights > 0, new_tiles=new_tiles, is_canceled=is_canceled)
@@ -317,11 +319,34 @@ class BakedFixedViews:
         rays += [*self._mirror_rays(samples, light, followed), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
 
-    def _refined(self, environment: EnvironmentKey) -> RefinedEnvironment:
-        """Return the tiles in which samples show an environment exactly, and its light in them."""
-        if environment == BAKED_ENVIRONMENT:
-            return RefinedEnvironment(self.tiles, self.lights, None)
-        return refine_environment(self, environment)
+    def refined_environment(self, environment: EnvironmentKey) -> RefinedEnvironment:
+        """Return an environment in the tiles in which samples show it exactly.
+
+        Raises:
+            NotFoundError: the environment does not exist here. SceneError: its files are damaged.
+        """
+        # the tiles of a relightable bake were chosen for any environment: none is exact in them alone
+        is_relightable = bool(self.store.attributes["relightable"])
+        if environment == BAKED_ENVIRONMENT and not is_relightable:
+            return RefinedEnvironment(self.tiles, self.lights, np.empty(0, np.intp))
+
+        def find_metric() -> float:
+            radiance = self.environment_radiance(None)
+            own = choose_tiles(radiance, len(self.tiles.codes)) if is_relightable else self.tiles
+            return environment_metric(own, EnvironmentTexels.from_radiance(radiance))
+
+        def refine() -> RefinedEnvironment:
+            texels = EnvironmentTexels.from_radiance(self.environment_radiance(environment.map))
+            metric = self.cache.get_value((self.key, "metric of tiles"), find_metric)
+            return refine_environment(self.tiles, self.shadow_ray_directions, texels, environment.rotation, metric)
+
+        return self.cache.get_value((self.key, "refined environment", environment), refine)
+
+    def _new_tiles(self, environment: EnvironmentKey) -> NewTiles | None:
+        """Return the tiles of an environment whose visibility is not baked; None if there are none."""
+        _, lights, unbaked = self.refined_environment(environment)
+        key = self.key, environment
+        return NewTiles(key, lights.num_lights, unbaked, lights.direction[unbaked]) if len(unbaked) else None
 
     def _linked(self, receivers: ShadingPoints, light: Illumination) -> ShadingPoints:
         """Return receivers whose visibility is zero where the environment does not light the surface."""
@@ -351,7 +376,7 @@ class BakedFixedViews:
 
     def _shared_triangles(self, light: Illumination, lobe: LobeSampling) -> NDArray[np.intp]:
         """Return the triangles that share their light with rays: all, if wide levels have no rays."""
-        lights = self._refined(light.environment.unlinked).lights
+        lights = self.refined_environment(light.environment.unlinked).lights
         return bright_triangles(lights) if lobe.is_narrow.all() else np.arange(lights.num_lights)
 
     def _lobe_rays(
@@ -436,7 +461,7 @@ class BakedFixedViews:
     def _lobe_environment(self, light: Illumination, shared: NDArray[np.intp]) -> tuple[LobeEnvironment, LobePeaks]:
         """Return the environment for lobe rays. shared: triangles that share their light with them"""
         key, rotation = light.environment.unlinked, light.environment.rotation
-        radiance, refined = self.environment_map(key.map), self._refined(key)
+        radiance, refined = self.environment_map(key.map), self.refined_environment(key)
 
         def tiles_of_texels(tiles: Tiles) -> NDArray[np.int32]:
             texel_args = radiance.shape[:2], rotation

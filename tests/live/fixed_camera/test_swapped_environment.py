@@ -32,8 +32,8 @@ def scene_under(radiance):
     return make_scene("other", scene.meshes, scene.materials, scene.cameras, light)
 
 
-def baked(scene, folder):
-    recipe = Recipe("direct", ("front",), SIZE, 1000)
+def baked(scene, folder, relightable=False):
+    recipe = Recipe("direct", ("front",), SIZE, 1000, relightable)
     return open_transfer(bake_in_process(METHODS["direct"], scene, recipe, folder), Cache(1 << 30))
 
 
@@ -98,6 +98,11 @@ def test_a_bake_in_another_environment_is_near_a_fresh_one(plain, map_name, tmp_
     expected = render_image(fresh, "front", make_look(fresh))
     # 0.0005; without new tiles 0.03
     assert relative_rmse(render_image(plain, "front", make_look(plain, under(map_name))), expected) < 0.002
+    relightable = baked(still_life(), tmp_path / "relightable.zarr", relightable=True)
+    own = [render_image(transfer, "front", make_look(transfer)) for transfer in (relightable, plain)]
+    assert relative_rmse(*own) < 0.01
+    other = render_image(relightable, "front", make_look(relightable, under(map_name)))
+    assert relative_rmse(other, expected) < 0.02
 
 
 def test_the_reference_uses_the_swapped_map(map_name):
