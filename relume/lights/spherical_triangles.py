@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -90,10 +90,6 @@ class TriangleLights:
     def solid_angle(self) -> Shaped[F32, " M"]:
         """Solid angle of each triangle, sr: of its light, which may be smaller than its tile."""
         return solid_angles(self.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)).astype(np.float32)
-
-    def ungrouped(self) -> TriangleLights:
-        """Return the same lights, each shaded by itself."""
-        return replace(self, codes=None)
 
     @cached_property
     def variance(self) -> Shaped[F64, " M"]:

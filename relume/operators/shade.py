@@ -114,6 +114,7 @@ class PartialImage:
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
         target_rows: Shaped[NDArray[np.bool_], " n"] | None = None,
+        base_radiance: Shaped[F32, "n 3"] | None = None,
     ) -> None:
         """Shade the missing samples.
 
@@ -122,13 +123,14 @@ class PartialImage:
             lights, receivers: incident light, and receivers.
             progress: called with the completed fraction. is_canceled: polled.
             target_rows: samples to shade, with others of the same ranges; None: all.
+            base_radiance: as in `Shader`.
         Raises:
             CancelledError: `is_canceled` returned True; completed ranges are kept.
         """
         contractions = contract_levels(term, bands, None)
 
         def shade_range(start: int, stop: int) -> None:
-            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop)
+            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, base_radiance)
 
         self.steps.run(shade_range, progress, is_canceled, "shading", target_rows)
 
@@ -140,6 +142,7 @@ def shade(
     receivers: ShadingPoints,
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
+    base_radiance: Shaped[F32, "n 3"] | None = None,
 ) -> ShadedTerm:
     """Contract all curves of a term.
 
@@ -147,9 +150,10 @@ def shade(
         bands: bands of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
         lights, receivers: incident light, and its receivers.
         progress: called with the completed fraction. is_canceled: polled.
+        base_radiance: as in `Shader`.
     Raises:
         CancelledError: `is_canceled` returned True.
     """
     partial_image = PartialImage.empty(len(receivers.normal))
-    partial_image.shade(term, bands, lights, receivers, progress, is_canceled)
+    partial_image.shade(term, bands, lights, receivers, progress, is_canceled, base_radiance=base_radiance)
     return ShadedTerm.from_rows(partial_image.rows)

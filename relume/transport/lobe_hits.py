@@ -305,7 +305,7 @@ def trace_lobe_rays(
     escapes = np.zeros((num_points, -(-num_rays // 8)), np.uint8)
     texture = np.zeros((num_slots, num_points, num_rays), np.uint32)
     levels = np.zeros(1, np.uint8) if level is None else level
-    args = geometry.embree.hit_tracer(coherent=False), points, wo, footprint, levels, lookup, surfaces, pattern
+    args = geometry.embree.hit_tracer(coherent=True), points, wo, footprint, levels, lookup, surfaces, pattern
     found: dict[int, LobePaths] = {}
 
     def kernel(start: int, stop: int) -> None:

@@ -28,6 +28,11 @@ class SplitLight(NamedTuple):
     lights: TriangleLights
     points: ShadingPoints
 
+    @property
+    def sample(self) -> Shaped[NDArray[np.intp], " points"]:
+        """Index in `rows` of the sample of each point."""
+        return np.repeat(np.arange(len(self.rows)), np.diff(self.first, append=self.points.points.num_points))
+
     def mean(self, values: Shaped[F32, "points 3"]) -> Shaped[F32, "k 3"]:
         """Average values of the points of each sample."""
         return group_means(values, self.first, 0)

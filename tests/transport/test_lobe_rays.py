@@ -58,7 +58,7 @@ def untextured(outgoing):
 def with_lobe_rays(term_document, normal, wo, radiance, *, num_lights=500, rotation=0.0, num_rays=144):
     """Points without occluders, with lobe rays and triangles of an environment."""
     tiles = choose_tiles(radiance, num_lights)
-    lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance), rotation).ungrouped()
+    lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance), rotation)
     pattern = make_lobe_pattern(sample_lobe(term_document, NO_LEVELS), num_rays, 3)
     hits = LobeHits(
         np.full((len(normal), num_rays), NO_HIT, np.uint16),
@@ -181,11 +181,34 @@ def test_rays_and_triangles_together_are_the_integral(roughness, rotation):
     np.testing.assert_allclose(radiance, expected, rtol=0.03)
 
 
+@pytest.mark.parametrize("num_rays", [34, 1597])
+@pytest.mark.parametrize("roughness", [0.05, 0.15, 0.22])
+def test_clusters_of_triangles_shine_as_their_triangles(roughness, num_rays):
+    """In clusters that share their light with many rays, and in those that do not."""
+    gloss, radiance_map = document("ggx", roughness=roughness, f0=0.5), np.full((128, 256, 3), 0.1, np.float32)
+    radiance_map[20:40, 60:80] = 50
+    toward = lookup_direction(30, 70)
+    for degrees in (0, 2, 5, 10):
+        half = np.radians(degrees)
+        axis = np.cos(half) * toward + np.sin(half) * any_tangent(toward[None].astype(np.float32))[0]
+        normal = np.tile(axis, (NUM_POINTS, 1)).astype(np.float32)
+        args = gloss, normal, normal, radiance_map
+        lights, receivers = with_lobe_rays(*args, num_lights=1500, num_rays=num_rays)
+        assert lights.clusters is not None
+        alone = shade(gloss, replace(lights, codes=None), receivers)
+        np.testing.assert_allclose(shade(gloss, lights, receivers), alone, rtol=4e-3)
+
+
+def lookup_direction(row, column):
+    """Direction of a texel's corner in a map of 128 × 256 texels. (3,)"""
+    azimuth, elevation = 2 * np.pi * (column / 256 - 0.5), np.pi * (0.5 - row / 128)
+    return np.array([np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])
+
+
 def test_a_sun_in_the_lobe_is_no_noise():
     gloss, radiance_map = document("ggx", roughness=0.22, f0=0.5), gradient_with_sun()
-    sun = (np.argmax(radiance_map[..., 0]) // 256 + 0.5, np.argmax(radiance_map[..., 0]) % 256 + 0.5)
-    azimuth, elevation = 2 * np.pi * (sun[1] / 256 - 0.5), np.pi * (0.5 - sun[0] / 128)
-    toward = np.array([np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])
+    row, column = divmod(int(np.argmax(radiance_map[..., 0])), 256)
+    toward = lookup_direction(row + 0.5, column + 0.5)
     normal = np.tile(toward, (NUM_POINTS, 1)).astype(np.float32)
     radiance = shade(gloss, *with_lobe_rays(gloss, normal, normal, radiance_map, num_lights=1500))
     assert radiance.std(axis=0)[0] < 0.05 * radiance.mean(axis=0)[0]

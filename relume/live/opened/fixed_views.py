@@ -310,7 +310,7 @@ class BakedFixedViews:
         receivers = self._linked(receivers, light)
         rays: list[RayList] = []
         if lobe is not None:
-            lights, receivers = self._share_with_rays(lights.ungrouped(), receivers, light, lobe)
+            lights, receivers = self._share_with_rays(lights, receivers, light, lobe)
             rays.append(self._lobe_rays(samples, receivers, light, lobe, quality, is_canceled, patch_light))
         if light.paths.has_indirect and (lobe is None or not lobe.is_narrow.all()):
             gather_rays = self._gather_rays(samples, light, quality, is_canceled)

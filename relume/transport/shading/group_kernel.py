@@ -9,6 +9,8 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.transport.shading.light_list_kernel import defer_triangles, error_tolerance, evaluate_listed
 from relume.transport.shading.table_averages import CHUNK, sum_up
 
+_WHOLE = np.float32(0.999)  # share t above which a group is shaded as one light
+
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def select_groups(visibility_words, first, group_lights, whole):  # type: ignore[no-untyped-def]
@@ -35,6 +37,21 @@ def _restore_lights(bits, first, group_lights, group):  # type: ignore[no-untype
     """Set the visibility of a group's lights, to shade them individually."""
     for k in range(first[group], first[group + 1]):
         bits[group_lights[k] >> 3] |= np.uint8(1) << np.uint8(group_lights[k] & 7)
+
+
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
+def restore_shared(listed, share, first, group_lights, num, visible, shading):  # type: ignore[no-untyped-def]
+    """Restore the lights of groups that share their light with lobe rays, and set the groups' shading to zero.
+
+    Args:
+        listed: the groups, `ListedLights`. share: t of each entry. first, group_lights: as in `select_groups`.
+        num: number of points. visible: as in `add_groups`. shading: of each entry, written. (1 or 3, ≥ K)
+    """
+    for row in range(num):
+        for entry in range(listed.first[row], listed.first[row + 1]):
+            if share[entry] < _WHOLE:
+                _restore_lights(visible[row], first, group_lights, listed.light[entry])
+                shading[:, entry] = 0
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)

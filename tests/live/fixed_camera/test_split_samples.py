@@ -9,8 +9,11 @@ from tiny_scenes import make_camera, make_tiny_scene, sphere
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.shading import average_split
+from relume.live.fixed_camera.view_images import ViewImages
 from relume.live.opened.openers import open_transfer
 from relume.methods.registry import METHODS
+from relume.operators.shade import shade
 from relume.output.render_image import render_image
 from relume.scene.model import Material
 from relume.store.bake_protocol import Recipe
@@ -83,12 +86,44 @@ def test_an_edit_of_f0_keeps_the_glint(coarse, is_reopened):
 
 
 def test_splits_are_where_neighbors_differ_most():
-    pixel, size, limits = np.arange(64 * 48), (64, 48), SplitLimits(9, 100)
+    pixel, size, limits = np.arange(64 * 48), (64, 48), SplitLimits(9, 1000)
     radiance = np.ones((64 * 48, 3), np.float32)
     radiance[10 * 64 + 20] = 500
     rows, side = choose_splits(pixel, size, radiance, limits)
     y, x = np.divmod(rows, 64)
     assert sorted(set(y)) == [9, 10, 11]
     assert sorted(set(x)) == [19, 20, 21]
-    assert np.all(side == 8)
+    assert np.all(side == 11)  # 1000 points for 9 samples: 10.5²
+    assert np.all(choose_splits(pixel, size, radiance, SplitLimits(9, 10_000))[1] == 12)
     assert len(choose_splits(pixel, size, np.ones_like(radiance), limits)[0]) == 0
+
+
+def test_points_grow_with_the_contrast_of_a_pixel():
+    """5 c^⅔ points, c by the mean: all but the bright pixels have zero."""
+    pixel, size = np.arange(64 * 48), (64, 48)
+    radiance = np.zeros((64 * 48, 3), np.float32)
+    radiance[10 * 64 + 20], radiance[40 * 64 + 20], radiance[25 * 64 + 50] = 1, 0.1, 0.03
+    rows, side = choose_splits(pixel, size, radiance, SplitLimits(27, 10_000))
+    of_bright = {int(row): int(number) for row, number in zip(rows, side, strict=True)}
+    contrast = {value: value * 64 * 48 / 1.13 for value in (1, 0.1, 0.03)}
+    expected = {value: min(12, round(np.sqrt(5 * c ** (2 / 3)))) for value, c in contrast.items()}
+    assert [of_bright[10 * 64 + 20], of_bright[40 * 64 + 20], of_bright[25 * 64 + 50]] == list(expected.values())
+    assert list(expected.values()) == [12, 12, 10]
+
+
+def test_points_of_a_pixel_are_shaded_as_exactly_as_its_mean_needs(coarse):
+    transfer, look = coarse, metal(coarse)
+    images = ViewImages(transfer, "front", Cache(BUDGET))
+    images.set_look(look)
+    target = next(images.targets())
+    lobe, term, bands = target.live.lobe, target.live.term, target.live.target_bands
+    lights, receivers = images.incident_light(target.material, images.light, lambda: False, lobe=lobe)
+    args = lambda fraction: None, lambda: False
+    rows = shade(term, bands, lights, receivers, *args).rows(target.material.num_samples)
+    split = images.split_light(target.material, images.light, lobe, lambda: rows, lambda: False)
+    exact = split.mean(shade(term, bands, split.lights, split.points, *args).rows(split.points.points.num_points))
+    averaged = average_split(rows, term, bands, split, lambda: False)
+    assert relative_error(averaged[split.rows], exact) < 2e-3
+    assert relative_error(rows[split.rows], exact) > 0.1
+    others = np.setdiff1d(np.arange(len(rows)), split.rows)
+    np.testing.assert_array_equal(averaged[others], rows[others])

@@ -21,10 +21,12 @@ from relume.live.fixed_camera.strategies.texel_sum import is_cacheable, put_texe
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.look.model import Rgb
 from relume.operators.shade import PartialImage, ShadedTerm, shade, shaded_bytes
-from relume.transport.split_light import SplitLight
+from relume.transport.split_light import SplitLight, group_means
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+_FIRST_POINTS = 5  # every fifth point of a pixel: not a divisor of its rows
+_KNOWN_RADIANCE = np.float32(8)  # of other points, by the mean over the first ones
 _PARTIAL_SUFFIX = "begun"  # ends the keys of partially shaded images
 
 
@@ -50,10 +52,25 @@ def average_split(
     """
     if split is None:
         return rows
-    at_points = shade(term, bands, split.lights, split.points, lambda fraction: None, is_canceled)
     averaged = rows.copy()
-    averaged[split.rows] = split.mean(at_points.rows(split.points.points.num_points))
+    averaged[split.rows] = split.mean(_shade_split_points(term, bands, split, is_canceled))
     return averaged
+
+
+def _shade_split_points(
+    term: Term, bands: Mapping[str, F64], split: SplitLight, is_canceled: CancelCheck
+) -> Shaped[F32, "points 3"]:
+    """Shade the points of split samples: some in each pixel, then all others as exactly as its mean needs."""
+    num_points, points = split.points.points.num_points, split.points
+    out, sample, mean = np.empty((num_points, 3), np.float32), split.sample, None
+    is_first = (np.arange(num_points) - split.first[sample]) % _FIRST_POINTS == 0
+    for selected in (np.flatnonzero(is_first), np.flatnonzero(~is_first)):
+        base = None if mean is None else _KNOWN_RADIANCE * mean[sample[selected]]
+        args = term, bands, split.lights, points.subset(selected), lambda fraction: None, is_canceled, base
+        out[selected] = shade(*args).rows(len(selected))
+        first = np.searchsorted(sample[selected], np.arange(len(split.rows)))
+        mean = np.abs(group_means(out[selected], first, 0)) if mean is None else mean
+    return out
 
 
 @dataclass(frozen=True, eq=False)
