@@ -35,12 +35,19 @@ from relume.core.simd import (
 )
 from relume.lights.spherical_triangles import TriangleLights
 from relume.transport.shading_points import ShadingPoints
+from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
 
 _builders: Any = cgutils  # has no type annotations
+_numba_types: Any = types
 _BYTES = np.arange(256, dtype=np.uint8)[:, None]
 _BIT_WEIGHTS = np.unpackbits(_BYTES, axis=1, bitorder="little").astype(np.float32)  # of each byte
+
+
+def is_constant(term: Term, contraction: Contraction) -> bool:
+    """Return whether a term reflects equally in all directions: it is Lambertian, and its curves are constant."""
+    return term.is_lambertian and contraction.kinds.size == 0
 
 
 def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, " m"]:
@@ -81,7 +88,7 @@ def _sum_bytes(typing_context, visible, point, bit_weights, lights, num_bytes, x
         return context.make_tuple(builder, signature.return_type, totals)
 
     index, normal_types = types.int64, (types.float32,) * 3
-    return types.UniTuple(types.float32, 3)(visible, index, bit_weights, lights, index, *normal_types), generate
+    return _numba_types.UniTuple(types.float32, 3)(visible, index, bit_weights, lights, index, *normal_types), generate
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)

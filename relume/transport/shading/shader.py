@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.lights.spherical_triangles import TriangleLights
-from relume.transport.diffuse_projector import DiffuseProjector
+from relume.transport.diffuse_projector import DiffuseProjector, is_constant
 from relume.transport.light_culling import ListedLights
 from relume.transport.light_lists import POINTS_PER_BLOCK, AreaLightList, LightList, area_light_lists
 from relume.transport.ray_projector import RayProjector
@@ -47,9 +47,9 @@ class Shader:
     ) -> None:
         self._lights, self._receivers, self._base_radiance = lights, receivers, base_radiance
         curves = self._curves = contraction.whole()
-        self._light_list = LightList(term, contraction, lights, receivers)
-        is_diffuse = term.is_lambertian and contraction.kinds.size == 0
+        is_diffuse = is_constant(term, contraction)
         self._diffuse = DiffuseProjector(term, contraction.constant, lights) if is_diffuse else None
+        self._light_list = None if is_diffuse else LightList(term, contraction, lights, receivers)
         is_groupable = contraction.kinds.size > 0 and not term.is_steep  # curves bound the variation within a group
         groups = lights.clusters if is_groupable else None
         self._grouped = groups and GroupedLights(term, contraction, curves, groups, lights.num_lights, receivers)
@@ -68,8 +68,8 @@ class Shader:
         self._rays.add(start, stop, out)  # first: triangles are divided by all light of a point
         if self._diffuse is not None:
             out[:, :, 0] += self._diffuse.shade(self._receivers, start, stop)
-        elif self._lights.num_lights:
-            self._add_listed(start, stop, out)
+        elif self._light_list is not None and self._lights.num_lights:
+            self._add_listed(self._light_list, start, stop, out)
         for area_light in self._area_lights:
             self._add_area_light(area_light, start, stop, out)
         return (out - base_radiance[..., None]).transpose(0, 2, 1)
@@ -81,9 +81,9 @@ class Shader:
             shading, _ = area_light.list(block, end)
             self._shade(area_light.listed, shading, table, block, end, out[block - start : end - start])
 
-    def _add_listed(self, start: int, stop: int, out: F32) -> None:
+    def _add_listed(self, light_list: LightList, start: int, stop: int, out: F32) -> None:
         """Add the environment by lists of lights."""
-        light_list, all_visible = self._light_list, self._receivers.visible
+        all_visible = self._receivers.visible
         table = TriangleTable(self._lights.nodes_by_light, light_list.irradiance_radius, _NO_GROUPS)
         for block in range(start, stop, POINTS_PER_BLOCK):
             end = min(block + POINTS_PER_BLOCK, stop)
