@@ -69,17 +69,18 @@ def shade_rows(
     start: int,
     stop: int,
     base_radiance: Shaped[F32, "n 3"] | None = None,
+    shader: type[Shader] = Shader,
 ) -> Shaped[F32, "m 3"]:
     """Contract all curves of a term at receivers [start, stop).
 
     Args:
         contractions: contractions of the term's curves, none of them free, from `contract_levels`.
-        lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`.
+        lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`. shader: its class.
     """
     if term.texels is not None and receivers.uv is not None:
         return texel_rows(term.texels, lights, receivers, start, stop)
-    shader = Shader if base_radiance is None else partial(Shader, base_radiance=base_radiance)
-    return project_levels(term, contractions, lights, receivers, start, stop, shader)[:, 0]
+    make_shader = shader if base_radiance is None else partial(shader, base_radiance=base_radiance)
+    return project_levels(term, contractions, lights, receivers, start, stop, make_shader)[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +115,7 @@ class PartialImage:
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
         target_rows: Shaped[NDArray[np.bool_], " n"] | None = None,
+        shader: type[Shader] = Shader,
     ) -> None:
         """Shade the missing samples.
 
@@ -121,14 +123,14 @@ class PartialImage:
             term: term of the image. bands: bands of its curves, as in `shade`.
             lights, receivers: incident light, and receivers.
             progress: called with the completed fraction. is_canceled: polled.
-            target_rows: samples to shade, with others of the same ranges; None: all.
+            target_rows: samples to shade, with others of the same ranges; None: all. shader: as in `shade_rows`.
         Raises:
             CancelledError: `is_canceled` returned True; completed ranges are kept.
         """
         contractions = contract_levels(term, bands, None)
 
         def shade_range(start: int, stop: int) -> None:
-            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop)
+            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, shader=shader)
 
         self.steps.run(shade_range, progress, is_canceled, "shading", target_rows)
 
@@ -140,16 +142,17 @@ def shade(
     receivers: ShadingPoints,
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
+    shader: type[Shader] = Shader,
 ) -> ShadedTerm:
     """Contract all curves of a term.
 
     Args:
         bands: bands of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
         lights, receivers: incident light, and its receivers.
-        progress: called with the completed fraction. is_canceled: polled.
+        progress: called with the completed fraction. is_canceled: polled. shader: as in `shade_rows`.
     Raises:
         CancelledError: `is_canceled` returned True.
     """
     partial_image = PartialImage.empty(len(receivers.normal))
-    partial_image.shade(term, bands, lights, receivers, progress, is_canceled)
+    partial_image.shade(term, bands, lights, receivers, progress, is_canceled, shader=shader)
     return ShadedTerm.from_rows(partial_image.rows)

@@ -20,11 +20,12 @@ from relume.transport.light_lists import POINTS_PER_BLOCK, AreaLightList, LightL
 from relume.transport.ray_projector import RayProjector
 from relume.transport.shading.grouped_lights import GroupedLights
 from relume.transport.shading.light_list_kernel import TriangleTable, allocate_scratch
-from relume.transport.shading.shade_kernel import allocate_division, shade_points
+from relume.transport.shading.shade_kernel import allocate_division, shade_points, shade_undivided
 from relume.transport.shading_points import ShadingPoints
 from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
+_ENTRIES_PER_BLOCK = 1 << 15  # of points and lights, if these are few
 _NO_GROUPS = np.empty(0, np.float32)
 
 
@@ -49,15 +50,21 @@ class Shader:
         curves = self._curves = contraction.whole()
         is_diffuse = is_constant(term, contraction)
         self._diffuse = DiffuseProjector(term, contraction.constant, lights) if is_diffuse else None
-        self._light_list = None if is_diffuse else LightList(term, contraction, lights, receivers)
         is_groupable = contraction.kinds.size > 0 and not term.is_steep  # curves bound the variation within a group
         groups = lights.clusters if is_groupable else None
         self._grouped = groups and GroupedLights(term, contraction, curves, groups, lights.num_lights, receivers)
+        self._points_per_block = POINTS_PER_BLOCK if groups is not None else self._block_size(lights.num_lights)
+        list_args = term, contraction, lights, receivers, self._points_per_block
+        self._light_list = None if is_diffuse else LightList(*list_args)
         self._rays = RayProjector(term, contraction, receivers, POINTS_PER_BLOCK)
         self._area_lights = area_light_lists(term, contraction, receivers)
         max_lights = max([lights.num_lights, *(area_light.max_triangles_per_point for area_light in self._area_lights)])
         self._scratch = allocate_scratch(curves, max_lights)
         self._division = allocate_division(self._scratch.chunks.value.shape[1])
+
+    def _block_size(self, num_lights: int) -> int:
+        """Return the number of points that are shaded together, if lights are not grouped."""
+        return POINTS_PER_BLOCK
 
     def project(self, start: int, stop: int) -> Shaped[F32, "m 1 3"]:
         """Return the reflected radiance of points [start, stop), with the layout of `Projector.project`."""
@@ -85,8 +92,8 @@ class Shader:
         """Add the environment by lists of lights."""
         all_visible = self._receivers.visible
         table = TriangleTable(self._lights.nodes_by_light, light_list.irradiance_radius, _NO_GROUPS)
-        for block in range(start, stop, POINTS_PER_BLOCK):
-            end = min(block + POINTS_PER_BLOCK, stop)
+        for block in range(start, stop, self._points_per_block):
+            end = min(block + self._points_per_block, stop)
             block_out = out[block - start : end - start]
             visible = self._grouped.add(block, end, block_out) if self._grouped else all_visible[block:end]
             self._shade(light_list.listed, light_list.list(block, visible), table, block, end, block_out)
@@ -94,3 +101,16 @@ class Shader:
     def _shade(self, listed: ListedLights, shading: F32, table: TriangleTable, start: int, stop: int, out: F32) -> None:
         block_args = self._curves, start, stop, self._scratch, self._division, out
         shade_points(self._receivers.points, listed, shading, table, *block_args)
+
+
+class UndividedShader(Shader):
+    """Shades without dividing triangles, for previews: three times as fast, with errors of some percent at highlights.
+
+    See `Shader`.
+    """
+
+    def _block_size(self, num_lights: int) -> int:
+        return max(POINTS_PER_BLOCK, _ENTRIES_PER_BLOCK // max(num_lights, 1))
+
+    def _shade(self, listed: ListedLights, shading: F32, table: TriangleTable, start: int, stop: int, out: F32) -> None:
+        shade_undivided(self._receivers.points, listed, shading, table, self._curves, start, stop, self._scratch, out)

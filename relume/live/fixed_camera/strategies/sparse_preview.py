@@ -2,8 +2,8 @@
 
     R = D + W (S − D)
 
-S is the light of the shaded samples and W interpolates. D is light of all samples: direct light of the environment on
-Lambertian terms, if the image is small enough, else zero (`relume.live.fixed_camera.strategies.dense_light`).
+S is the light of the shaded samples and W interpolates. D is a part of the light, shaded at all samples if the image is
+small enough, else zero (`relume.live.fixed_camera.strategies.dense_light`).
 
 If the environment is rotated or replaced, or reflectances for indirect light change, all images of a picture become
 invalid at once, and shading all samples takes seconds. The same holds for a newly opened view, and for a term whose
@@ -26,16 +26,25 @@ from scipy.sparse import csr_array
 from relume.brdf.term import Term
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
-from relume.live.fixed_camera.illumination import Illumination, direct_environment, direct_only
+from relume.live.fixed_camera.illumination import Illumination, direct_only
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.protocols import FixedViewTransfer, LightQuality, Samples
 from relume.live.fixed_camera.strategies import incremental_light
-from relume.live.fixed_camera.strategies.dense_light import find_dense_terms, is_dense_alone, shade_constant
+from relume.live.fixed_camera.strategies.dense_light import (
+    NO_DENSE_TERMS,
+    DenseTerms,
+    find_dense_terms,
+    is_dense_alone,
+    shade_dense,
+)
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look.model import Rgb
+from relume.operators.interpolation import add_interpolated
+from relume.operators.linear_operator import tile_layout
 from relume.operators.shade import ShadedTerm, shade
 from relume.operators.texel_light import collect_light, fits_budget, indirect_texel_light
+from relume.transport.shading.shader import UndividedShader
 from relume.views.pixel_blocks import block_sizes, nearest_chosen, one_per_block
 from relume.views.view import View
 
@@ -154,7 +163,7 @@ class SparsePreview:
 
     Attributes:
         gain: gain of the finished image in that light.
-        detail: number of refinements. dense_terms: whose direct light is shaded at all samples, by index.
+        detail: number of refinements. dense_terms: indices of the terms that are also shaded at all samples.
     """
 
     images: ViewImages
@@ -162,7 +171,7 @@ class SparsePreview:
     gain: Rgb
     snapshots: Sequence[_TermSnapshot]
     detail: int = 0
-    dense_terms: frozenset[int] = frozenset()
+    dense_terms: DenseTerms = NO_DENSE_TERMS
 
     @classmethod
     def for_targets(
@@ -181,7 +190,7 @@ class SparsePreview:
             is_read: samples of the view have been read already; else a dense preview takes longer.
         """
         snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
-        dense_terms = find_dense_terms(images, targets, light) if is_read else frozenset[int]()
+        dense_terms = find_dense_terms(images, targets, light) if is_read else NO_DENSE_TERMS
         return cls(images, light, images.gain, snapshots, detail, dense_terms)
 
     def job(
@@ -208,20 +217,21 @@ class SparsePreview:
         previews = []
         for k, snapshot in enumerate(self.snapshots):
             subset = _sample_subset(self.images, snapshot.target.material.index, self.light, self.detail)
-            dense = self._dense_image(snapshot, is_canceled) if k in self.dense_terms else None
-            if dense is not None and is_dense_alone(self.light):
+            dense = self._dense_image(k, is_canceled)
+            if dense is not None and k in self.dense_terms.diffuse and is_dense_alone(self.light):
                 previews.append(dense.image)
             else:
                 previews.append(self._preview_image(snapshot, subset, dense, is_canceled))
             progress((k + 1) / len(self.snapshots))
         return previews
 
-    def _dense_image(self, snapshot: _TermSnapshot, is_canceled: CancelCheck) -> ShadedTerm:
-        """Shade the direct light of the environment on a term at all samples."""
-        incident = self.images.incident_light(
-            snapshot.target.material, direct_environment(self.light), is_canceled, LightQuality.PREVIEW
-        )
-        return shade_constant(snapshot.term, snapshot.bands, *incident)
+    def _dense_image(self, index: int, is_canceled: CancelCheck) -> ShadedTerm | None:
+        """Shade a part of the light on a term at all samples; None if it takes too long. index: of the term"""
+        terms, snapshot = self.dense_terms, self.snapshots[index]
+        if index not in terms.diffuse | terms.glossy:
+            return None
+        shade_args = snapshot.target, snapshot.term, snapshot.bands, self.light, is_canceled
+        return shade_dense(*shade_args, is_bright_only=index in terms.glossy)
 
     def _preview_image(
         self, snapshot: _TermSnapshot, subset: SampleSubset, dense: ShadedTerm | None, is_canceled: CancelCheck
@@ -233,7 +243,8 @@ class SparsePreview:
         transfer, btf_ref = self.images.transfer, snapshot.term.texels
         incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
-            shaded = shade(snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled)
+            shade_args = snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled
+            shaded = shade(*shade_args, shader=UndividedShader)
             return _interpolate(shaded, subset, dense)
         receivers = self.images.unlit_samples(snapshot.target.material)
         return indirect_texel_light(
@@ -266,13 +277,21 @@ def _ignore_progress(fraction: float) -> None:
 
 
 def _interpolate(shaded: ShadedTerm, subset: SampleSubset, dense: ShadedTerm | None) -> F32:
-    """Interpolate an image of all samples from the shaded ones, or its difference from `dense`. (tiles, 3, samples)"""
+    """Interpolate an image of all samples from the shaded ones, or its difference from `dense`, which is overwritten.
+
+    Returns:
+        (tiles, 3, samples) float32
+    """
     num_samples, num_shaded = subset.weights.shape
+    tiles, lanes = tile_layout(num_samples)
     rows = shaded.rows(num_shaded)
     if dense is None:
-        return ShadedTerm.from_rows(subset.weights @ rows).image
-    difference = rows - dense.rows(num_samples)[subset.sample_indices]
-    return dense.image + ShadedTerm.from_rows(subset.weights @ difference).image
+        image = np.zeros((tiles, 3, lanes), np.float32)
+    else:
+        image = dense.image
+        rows = rows - image[subset.sample_indices // lanes, :, subset.sample_indices % lanes]
+    add_interpolated(subset.weights, rows, image)
+    return image
 
 
 def _preview_job(situation: Situation) -> Job | None:
