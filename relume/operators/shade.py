@@ -69,16 +69,18 @@ def shade_rows(
     start: int,
     stop: int,
     base_radiance: Shaped[F32, "n 3"] | None = None,
-    shader: type[Shader] = Shader,
+    shader: type[Shader] | None = None,
 ) -> Shaped[F32, "m 3"]:
     """Contract all curves of a term at receivers [start, stop).
 
     Args:
         contractions: contractions of the term's curves, none of them free, from `contract_levels`.
-        lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`. shader: its class.
+        lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`.
+        shader: its class; None: `Shader`.
     """
     if term.texels is not None and receivers.uv is not None:
         return texel_rows(term.texels, lights, receivers, start, stop)
+    shader = shader or Shader
     make_shader = shader if base_radiance is None else partial(shader, base_radiance=base_radiance)
     return project_levels(term, contractions, lights, receivers, start, stop, make_shader)[:, 0]
 
@@ -115,7 +117,7 @@ class PartialImage:
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
         target_rows: Shaped[NDArray[np.bool_], " n"] | None = None,
-        shader: type[Shader] = Shader,
+        shader: type[Shader] | None = None,
     ) -> None:
         """Shade the missing samples.
 
@@ -142,7 +144,7 @@ def shade(
     receivers: ShadingPoints,
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
-    shader: type[Shader] = Shader,
+    shader: type[Shader] | None = None,
 ) -> ShadedTerm:
     """Contract all curves of a term.
 

@@ -104,9 +104,9 @@ class Shader:
 
 
 class UndividedShader(Shader):
-    """Shades without dividing triangles, for previews: three times as fast, with errors of some percent at highlights.
+    """Shades without dividing triangles, for previews: about three times as fast.
 
-    See `Shader`.
+    Under 500 lights, lobes of 0.16 rad have a relative RMSE of 2 to 3 %; single points are off by a quarter.
     """
 
     def _block_size(self, num_lights: int) -> int:

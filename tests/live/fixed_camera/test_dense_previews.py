@@ -1,4 +1,4 @@
-"""Previews shade the environment's direct light on Lambertian terms at all samples."""
+"""Previews shade a part of the environment's direct light at all samples: on Lambertian terms, and in highlights."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from session_edits import BUDGET, kind_of, make_look, relative_rmse, run_until_e
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.dense_light import find_dense_terms
+from relume.views.pixel_blocks import block_sizes
 
 
 @pytest.fixture(autouse=True)
@@ -50,11 +52,8 @@ def preview_and_exact(bake, change, budget=BUDGET):
 def test_direct_light_on_lambertian_terms_is_exact(transfer):
     preview, exact, is_diffuse = preview_and_exact(transfer, turned)
     assert set(is_diffuse.values()) == {False, True}
-    for key, image in preview.items():
-        if is_diffuse[key]:
-            np.testing.assert_allclose(image, exact[key], rtol=1e-5, atol=1e-6)
-        else:
-            assert relative_rmse(image, exact[key]) > 1e-3
+    for key in (key for key in preview if is_diffuse[key]):
+        np.testing.assert_allclose(preview[key], exact[key], rtol=1e-5, atol=1e-6)
 
 
 def showing(show):
@@ -73,6 +72,40 @@ def test_interpolated_indirect_light_is_added_to_exact_direct_light(gathered):
     for key in (key for key in of_all if is_diffuse[key]):
         assert indirect[key].max() > 0
         np.testing.assert_allclose(of_all[key], direct[key] + indirect[key], rtol=1e-4, atol=1e-5)
+
+
+def glossy_errors(preview, exact, is_diffuse):
+    return {key: relative_rmse(preview[key], exact[key]) for key in preview if not is_diffuse[key]}
+
+
+def test_with_all_lights_and_whole_curves_highlights_are_exact(transfer, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._NUM_BRIGHT", 1000)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._LEAST_PART", 0.0)
+    errors = glossy_errors(*preview_and_exact(transfer, turned))
+    assert errors
+    assert max(errors.values()) < 0.03
+
+
+def test_bright_highlights_are_not_interpolated(transfer, monkeypatch):
+    dense = glossy_errors(*preview_and_exact(transfer, turned))
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._MAX_GLOSSY", 0)
+    sparse = glossy_errors(*preview_and_exact(transfer, turned))
+    assert all(dense[key] < 0.5 * sparse[key] for key in dense)
+
+
+def test_materials_that_bend_most_come_first(transfer, monkeypatch):
+    """With time for the samples of one material alone."""
+    images = Picture(transfer, "front", Cache(BUDGET))._images
+    targets, sizes = list(images.targets()), block_sizes(images.view, 1)
+    glossy = {k: target for k, target in enumerate(targets) if not target.live.term.is_lambertian}
+    first = min(glossy, key=lambda k: sizes[targets[k].material.index])
+    assert len(glossy) > 1
+    num_samples = targets[first].material.num_samples
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._MAX_GLOSSY", num_samples)
+    assert first in find_dense_terms(images, targets, images.light).glossy
+    assert sum(targets[k].material.num_samples for k in find_dense_terms(images, targets, images.light).glossy) <= (
+        num_samples
+    )
 
 
 def test_images_that_take_too_long_stay_sparse(transfer, monkeypatch):

@@ -34,6 +34,7 @@ _MAX_PAIRS = 5 * 10**8  # of samples of Lambertian terms and lights: 0.1 s of pr
 _MAX_GLOSSY = 100_000  # samples of other terms: 0.1 s of processor time
 _NUM_BRIGHT = 48  # lights of which their highlights are
 _LEAST_PART = 3e-3  # of the peak of a curve: the rest of a highlight is interpolated
+_MIN_UNDIVIDED = 500  # lights of the environment: their triangles are smaller than most highlights
 _BYTES_PER_SAMPLE = 80  # without visibility
 _MEMORY_DIVISOR = 4  # samples must fit the cache between frames
 
@@ -68,6 +69,14 @@ def find_dense_terms(images: ViewImages, targets: Sequence[TermTarget], light: I
     if sum(targets[k].material.num_samples for k in diffuse) * num_lights > _MAX_PAIRS:
         return NO_DENSE_TERMS
     return DenseTerms(diffuse, _find_glossy(images, targets, diffuse))
+
+
+def preview_shader(images: ViewImages) -> type[UndividedShader] | None:
+    """Return the class that shades previews; None as in exact images: large triangles of few lights are divided.
+
+    images: the terms.
+    """
+    return None if images.transfer.num_lights < _MIN_UNDIVIDED else UndividedShader
 
 
 def _is_diffuse(target: TermTarget) -> bool:
@@ -106,10 +115,10 @@ def shade_dense(
     if is_bright_only:
         lights, receivers = _brightest(lights, receivers)
     contractions = [each.without_tails(_LEAST_PART) for each in contract_levels(term, bands, None)]
-    rows = np.empty_like(receivers.normal)
+    rows, shader = np.empty_like(receivers.normal), preview_shader(target.images)
 
     def shade_range(start: int, stop: int) -> None:
-        rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, shader=UndividedShader)
+        rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, shader=shader)
 
     parallel_for_chunks(shade_range, len(rows))
     return ShadedTerm.from_rows(rows)

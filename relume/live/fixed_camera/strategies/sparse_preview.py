@@ -35,6 +35,7 @@ from relume.live.fixed_camera.strategies.dense_light import (
     DenseTerms,
     find_dense_terms,
     is_dense_alone,
+    preview_shader,
     shade_dense,
 )
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
@@ -44,7 +45,6 @@ from relume.operators.interpolation import add_interpolated
 from relume.operators.linear_operator import tile_layout
 from relume.operators.shade import ShadedTerm, shade
 from relume.operators.texel_light import collect_light, fits_budget, indirect_texel_light
-from relume.transport.shading.shader import UndividedShader
 from relume.views.pixel_blocks import block_sizes, nearest_chosen, one_per_block
 from relume.views.view import View
 
@@ -244,7 +244,7 @@ class SparsePreview:
         incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
             shade_args = snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled
-            shaded = shade(*shade_args, shader=UndividedShader)
+            shaded = shade(*shade_args, shader=preview_shader(self.images))
             return _interpolate(shaded, subset, dense)
         receivers = self.images.unlit_samples(snapshot.target.material)
         return indirect_texel_light(
