@@ -132,7 +132,7 @@ class PartialImage:
         contractions = contract_levels(term, bands, None)
 
         def shade_range(start: int, stop: int) -> None:
-            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, shader=shader)
+            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, None, shader)
 
         self.steps.run(shade_range, progress, is_canceled, "shading", target_rows)
 
