@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from jaxtyping import Shaped
@@ -27,6 +26,7 @@ from relume.transport.shading_points import ShadingPoints
 from relume.transport.term_contraction import Contraction
 
 F32 = NDArray[np.float32]
+MakeShader = Callable[[Term, Contraction, TriangleLights, ShadingPoints], Shader]
 
 _MIN_ROWS_PER_STEP, _MAX_ROWS_PER_STEP, _NUM_STEPS = 128, 2048, 8
 
@@ -68,18 +68,17 @@ def shade_rows(
     receivers: ShadingPoints,
     start: int,
     stop: int,
-    base_radiance: Shaped[F32, "n 3"] | None = None,
+    make_shader: MakeShader | None = None,
 ) -> Shaped[F32, "m 3"]:
     """Contract all curves of a term at receivers [start, stop).
 
     Args:
         contractions: contractions of the term's curves, none of them free, from `contract_levels`.
-        lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`.
+        lights, receivers: incident light, and its receivers. make_shader: returns a shader; None: `Shader`.
     """
     if term.texels is not None and receivers.uv is not None:
         return texel_rows(term.texels, lights, receivers, start, stop)
-    shader = Shader if base_radiance is None else partial(Shader, base_radiance=base_radiance)
-    return project_levels(term, contractions, lights, receivers, start, stop, shader)[:, 0]
+    return project_levels(term, contractions, lights, receivers, start, stop, make_shader or Shader)[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ class PartialImage:
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
         target_rows: Shaped[NDArray[np.bool_], " n"] | None = None,
-        base_radiance: Shaped[F32, "n 3"] | None = None,
+        make_shader: MakeShader | None = None,
     ) -> None:
         """Shade the missing samples.
 
@@ -122,15 +121,14 @@ class PartialImage:
             term: term of the image. bands: bands of its curves, as in `shade`.
             lights, receivers: incident light, and receivers.
             progress: called with the completed fraction. is_canceled: polled.
-            target_rows: samples to shade, with others of the same ranges; None: all.
-            base_radiance: as in `Shader`.
+            target_rows: samples to shade, with others of the same ranges; None: all. make_shader: as in `shade_rows`.
         Raises:
             CancelledError: `is_canceled` returned True; completed ranges are kept.
         """
         contractions = contract_levels(term, bands, None)
 
         def shade_range(start: int, stop: int) -> None:
-            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, base_radiance)
+            self.rows[start:stop] = shade_rows(term, contractions, lights, receivers, start, stop, make_shader)
 
         self.steps.run(shade_range, progress, is_canceled, "shading", target_rows)
 
@@ -142,18 +140,17 @@ def shade(
     receivers: ShadingPoints,
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
-    base_radiance: Shaped[F32, "n 3"] | None = None,
+    make_shader: MakeShader | None = None,
 ) -> ShadedTerm:
     """Contract all curves of a term.
 
     Args:
         bands: bands of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
         lights, receivers: incident light, and its receivers.
-        progress: called with the completed fraction. is_canceled: polled.
-        base_radiance: as in `Shader`.
+        progress: called with the completed fraction. is_canceled: polled. make_shader: as in `shade_rows`.
     Raises:
         CancelledError: `is_canceled` returned True.
     """
     partial_image = PartialImage.empty(len(receivers.normal))
-    partial_image.shade(term, bands, lights, receivers, progress, is_canceled, base_radiance=base_radiance)
+    partial_image.shade(term, bands, lights, receivers, progress, is_canceled, make_shader=make_shader)
     return ShadedTerm.from_rows(partial_image.rows)

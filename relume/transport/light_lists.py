@@ -62,22 +62,30 @@ class LightList:
     Args:
         term: the BRDF term. contraction: its curves, from `contract`.
         lights: triangles of the environment. receivers: all points, with their visibility and rays.
+        points_per_block: maximum number of points listed at once.
 
     Attributes:
         irradiance: of the lights, times constant curves. (M, 3)
         listed: written by `list`.
     """
 
-    def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: ShadingPoints) -> None:
+    def __init__(
+        self,
+        term: Term,
+        contraction: Contraction,
+        lights: TriangleLights,
+        receivers: ShadingPoints,
+        points_per_block: int = POINTS_PER_BLOCK,
+    ) -> None:
         self._term, self._lights, self._receivers = term, lights, receivers
         self._lobe_rays = find_lobe_rays(receivers)
         self.irradiance = lights.irradiance * contraction.constant
         self._support = _curve_support(contraction)
         self._visible_fraction = np.empty(
-            (lights.num_lights if lights.parts is not None else 0, POINTS_PER_BLOCK), np.float32
+            (lights.num_lights if lights.parts is not None else 0, points_per_block), np.float32
         )
         self._scratch = np.empty((2, lights.num_lights), np.float32)
-        self.listed = allocate_list(POINTS_PER_BLOCK, POINTS_PER_BLOCK * lights.num_lights)
+        self.listed = allocate_list(points_per_block, points_per_block * lights.num_lights)
 
     @cached_property
     def irradiance_radius(self) -> Shaped[F32, "M 4"]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.patches.neighbor_filter import NeighborFilter
-from relume.transport.diffuse_projector import diffuse_quotients
+from relume.transport.diffuse_projector import diffuse_quotients, is_constant
 from relume.transport.ray_kernel import allocate_scratch, project_rays, sum_rays, weight_rays
 from relume.transport.shading_points import GatherRays, RayList, ShadingPoints, allocate_list, is_area_light
 from relume.transport.term_contraction import Contraction
@@ -57,7 +57,7 @@ class RayProjector:
 
     def _add(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int, out: F32) -> None:
         c = self._contraction
-        if c.kinds.size == 0 and self._term.is_lambertian and isinstance(rays, GatherRays):
+        if is_constant(self._term, c) and isinstance(rays, GatherRays):
             out[:, :, 0] += diffuse_quotients(self._term, receivers, start, stop)[:, None] * rays.sum(
                 receivers, start, stop
             )

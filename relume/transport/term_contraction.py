@@ -79,6 +79,11 @@ class Contraction(NamedTuple):
             weakref.finalize(self.bands, _whole_curves.pop, key, None).atexit = False
         return _whole_curves[key]
 
+    def without_tails(self, fraction: float) -> Contraction:
+        """Return the same for highlights alone: curves end where they stay below a fraction of their peak."""
+        support = [_support(rows[:, :num], fraction) for rows, num in zip(self.bands, self.num_bands, strict=True)]
+        return self._replace(support=np.array(support, np.float32))
+
     def _sum_curves(self) -> WholeCurves:
         steps = np.zeros((*self.bands.shape, 3), np.float32)
         for curve_steps, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
@@ -93,9 +98,9 @@ _whole_curves: dict[int, WholeCurves] = {}
 """By identity of `Contraction.bands`, as long as these exist."""
 
 
-def _support(rows: NDArray[np.float64]) -> float:
-    """Count the bands beyond which every row of a curve (..., J) stays below a billionth of its peak."""
-    above = rows > _NOTHING * rows.max(axis=-1, keepdims=True)
+def _support(rows: NDArray[np.floating], fraction: float = _NOTHING) -> float:
+    """Count the bands beyond which every row of a curve (..., J) stays below a fraction of its peak."""
+    above = rows > fraction * rows.max(axis=-1, keepdims=True)
     nonzero_bands = np.nonzero(above.reshape(-1, rows.shape[-1]).any(axis=0))[0]
     return float(nonzero_bands[-1] + 1) if len(nonzero_bands) else 0.0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -205,13 +205,21 @@ class View:
         Args:
             material: its index. is_lit: the environment emits light; else no visibility is read.
         """
+        unlit = self._read_unlit(material)
+        return replace(unlit, visible=self._read_visibility(material)) if is_lit else unlit
+
+    def _read_unlit(self, material: int) -> ShadingPoints:
+        """Read a material's samples without visibility, cached because previews need them in each frame."""
+        key = self.key, "receivers", *self.sample_key(material)
+        return self.cache.transient.get_value(key, lambda: self._make_unlit(material))
+
+    def _make_unlit(self, material: int) -> ShadingPoints:
         rows = self.rows(material)
-        visible = self._read_visibility(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
         surface_points = self.surface_points(material)
         uv = read_uv(self.store, self.index, rows.start, rows.stop)
         level = self.level[rows] if self.level_pairs[material] else None
         wo = view_directions(self.ray_origins(rows), surface_points.position)
-        return ShadingPoints(surface_points, wo, visible, (), uv, level)
+        return ShadingPoints(surface_points, wo, np.empty((len(wo), 0), np.uint8), (), uv, level)
 
     def _read_visibility(self, material: int) -> NDArray[np.uint8]:
         """Read the visibility of a material's samples, cached because decompression is slow."""

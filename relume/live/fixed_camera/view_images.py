@@ -235,12 +235,7 @@ class ViewImages:
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""
-
-        def read() -> ShadingPoints:
-            return self.view.receivers(material.index, is_lit=False)
-
-        key = self.transfer.key, "receivers", *self.view.sample_key(material.index)
-        return self.cache.get_value(key, read)
+        return self.view.receivers(material.index, is_lit=False)
 
     def is_default(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> bool:
         """True if `live`, a term of `material`, in `light` is of the scene's own look, cached next to the store."""

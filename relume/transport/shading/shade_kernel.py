@@ -146,6 +146,17 @@ def _add_divided(curves, num, tolerance, scratch, division):  # type: ignore[no-
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
+def shade_undivided(points, listed, shading, table, curves, start, stop, scratch, out):  # type: ignore[no-untyped-def]
+    """Add the contributions of the listed lights to points [start, stop), and divide none. See `shade_points`."""
+    for p in range(start, stop):
+        begin, end = listed.first[p - start], listed.first[p - start + 1]
+        if begin < end:
+            n, t = points.normal[p], points.tangent[p]
+            evaluate_listed(n, t, listed, shading, begin, end, table, curves, scratch)
+            _add_to(out[p - start, :, 0], scratch.total)
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def shade_points(points, listed, shading, table, curves, start, stop, scratch, division, out):  # type: ignore[no-untyped-def]
     """Add the contributions of the listed lights to points [start, stop).
 

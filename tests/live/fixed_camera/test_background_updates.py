@@ -176,6 +176,7 @@ def test_an_opened_picture_is_complete_at_once_and_then_shaded(opened, maps, mon
 
 def test_direct_light_is_shown_before_indirect_light(gathered, maps, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._MAX_PAIRS", 0)  # direct light is unchanged
     lit = lit_by(maps, 1, rotation=33.0)
 
     def show_direct(document):

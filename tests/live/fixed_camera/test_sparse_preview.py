@@ -30,8 +30,9 @@ def make(picture, need):
 
 @pytest.fixture
 def few(monkeypatch):
-    """As few samples as for a picture of 200 × 150."""
+    """As few samples as for a picture of 200 × 150, and no light of all samples."""
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 600)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._MAX_PAIRS", 0)
 
 
 @pytest.mark.usefixtures("few")

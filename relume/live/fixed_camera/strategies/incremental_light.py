@@ -43,6 +43,7 @@ from relume.raytrace.local_light_visibility import compute_irradiance
 from relume.raytrace.moving_light import MovingLight
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.roughness_ranges import contract_levels
+from relume.transport.shading.shader import Shader
 from relume.transport.shading_points import LocalRays, ShadingPoints
 from relume.transport.term_contraction import contract
 from relume.views.compose_terms import add_diffuse
@@ -284,10 +285,10 @@ class _MovedLights:
     @staticmethod
     def _rows(live: LiveTerm, receivers: ShadingPoints, num_samples: int, base_radiance: F32 | None) -> F32:
         contractions = contract_levels(live.term, live.target_bands, None)
-        rows = np.empty((num_samples, 3), np.float32)
+        rows, make_shader = np.empty((num_samples, 3), np.float32), partial(Shader, base_radiance=base_radiance)
 
         def add(start: int, stop: int) -> None:
-            rows[start:stop] = shade_rows(live.term, contractions, NO_LIGHTS, receivers, start, stop, base_radiance)
+            rows[start:stop] = shade_rows(live.term, contractions, NO_LIGHTS, receivers, start, stop, make_shader)
 
         parallel_for_chunks(add, len(rows))
         return rows

@@ -21,6 +21,7 @@ from relume.live.fixed_camera.strategies.texel_sum import is_cacheable, put_texe
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.look.model import Rgb
 from relume.operators.shade import PartialImage, ShadedTerm, shade, shaded_bytes
+from relume.transport.shading.shader import Shader
 from relume.transport.split_light import SplitLight, group_means
 
 F32 = NDArray[np.float32]
@@ -65,9 +66,9 @@ def _shade_split_points(
     out, sample, mean = np.empty((num_points, 3), np.float32), split.sample, None
     is_first = (np.arange(num_points) - split.first[sample]) % _FIRST_POINTS == 0
     for selected in (np.flatnonzero(is_first), np.flatnonzero(~is_first)):
-        base = None if mean is None else _KNOWN_RADIANCE * mean[sample[selected]]
-        args = term, bands, split.lights, points.subset(selected), lambda fraction: None, is_canceled, base
-        out[selected] = shade(*args).rows(len(selected))
+        base_radiance = None if mean is None else _KNOWN_RADIANCE * mean[sample[selected]]
+        args = term, bands, split.lights, points.subset(selected), lambda fraction: None, is_canceled
+        out[selected] = shade(*args, partial(Shader, base_radiance=base_radiance)).rows(len(selected))
         first = np.searchsorted(sample[selected], np.arange(len(split.rows)))
         mean = np.abs(group_means(out[selected], first, 0)) if mean is None else mean
     return out

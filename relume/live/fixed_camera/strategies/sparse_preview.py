@@ -1,5 +1,10 @@
 """A sparse preview in another light: one sample per pixel block is shaded, and the others are interpolated.
 
+    R = D + W (S − D)
+
+S is the light of the shaded samples and W interpolates. D is a part of the light, shaded at all samples if the image is
+small enough, else zero (`relume.live.fixed_camera.strategies.dense_light`).
+
 If the environment is rotated or replaced, or reflectances for indirect light change, all images of a picture become
 invalid at once, and shading all samples takes seconds. The same holds for a newly opened view, and for a term whose
 fixed parameter changes. A preview costs a few thousand samples at any image size, needs no operator, and shows
@@ -9,11 +14,12 @@ ends, all samples are shaded. In large images finer previews come first, each wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -24,9 +30,19 @@ from relume.live.fixed_camera.illumination import Illumination, direct_only
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.protocols import FixedViewTransfer, LightQuality, Samples
 from relume.live.fixed_camera.strategies import incremental_light
+from relume.live.fixed_camera.strategies.dense_light import (
+    NO_DENSE_TERMS,
+    DenseTerms,
+    find_dense_terms,
+    is_dense_alone,
+    preview_shader,
+    shade_dense,
+)
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look.model import Rgb
+from relume.operators.interpolation import add_interpolated
+from relume.operators.linear_operator import tile_layout
 from relume.operators.shade import ShadedTerm, shade
 from relume.operators.texel_light import collect_light, fits_budget, indirect_texel_light
 from relume.views.pixel_blocks import block_sizes, nearest_chosen, one_per_block
@@ -47,9 +63,11 @@ class SampleSubset:
     """The shaded samples of a material, and the weights that interpolate all others.
 
     Attributes:
-        samples: the shaded samples. weights: sparse float32, rows sum to 1. (samples, shaded samples)
+        sample_indices: of the shaded samples, counted from the material's first. samples: the same.
+        weights: sparse float32, rows sum to 1. (samples, shaded samples)
     """
 
+    sample_indices: Shaped[NDArray[np.intp], " k"]
     samples: Samples
     weights: Any
 
@@ -78,7 +96,7 @@ def choose_samples(
     weights = csr_array((weight.ravel(), neighbors.ravel(), first), shape=shape)
     weights.eliminate_zeros()
     samples = transfer.selected_samples(view, material, sample_indices, has_indirect=has_indirect)
-    return SampleSubset(samples, weights)
+    return SampleSubset(sample_indices, samples, weights)
 
 
 def _num_shaded(detail: int) -> int:
@@ -145,7 +163,7 @@ class SparsePreview:
 
     Attributes:
         gain: gain of the finished image in that light.
-        detail: number of refinements.
+        detail: number of refinements. dense_terms: indices of the terms that are also shaded at all samples.
     """
 
     images: ViewImages
@@ -153,18 +171,27 @@ class SparsePreview:
     gain: Rgb
     snapshots: Sequence[_TermSnapshot]
     detail: int = 0
+    dense_terms: DenseTerms = NO_DENSE_TERMS
 
     @classmethod
     def for_targets(
-        cls, images: ViewImages, targets: Iterable[TermTarget], light: Illumination, detail: int = 0
+        cls,
+        images: ViewImages,
+        targets: Sequence[TermTarget],
+        light: Illumination,
+        detail: int = 0,
+        *,
+        is_read: bool = True,
     ) -> SparsePreview:
         """Return the preview of terms, with their current curves.
 
         Args:
             images, targets: the terms. light: the illumination. detail: number of refinements.
+            is_read: samples of the view have been read already; else a dense preview takes longer.
         """
         snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
-        return cls(images, light, images.gain, snapshots, detail)
+        dense_terms = find_dense_terms(images, targets, light) if is_read else NO_DENSE_TERMS
+        return cls(images, light, images.gain, snapshots, detail, dense_terms)
 
     def job(
         self, label: str, on_preview: Callable[[Illumination, Rgb], None], priority: Priority = Priority.IMAGE
@@ -190,18 +217,35 @@ class SparsePreview:
         previews = []
         for k, snapshot in enumerate(self.snapshots):
             subset = _sample_subset(self.images, snapshot.target.material.index, self.light, self.detail)
-            previews.append(self._preview_image(snapshot, subset, is_canceled))
+            dense = self._dense_image(k, is_canceled)
+            if dense is not None and k in self.dense_terms.diffuse and is_dense_alone(self.light):
+                previews.append(dense.image)
+            else:
+                previews.append(self._preview_image(snapshot, subset, dense, is_canceled))
             progress((k + 1) / len(self.snapshots))
         return previews
 
-    def _preview_image(self, snapshot: _TermSnapshot, subset: SampleSubset, is_canceled: CancelCheck) -> F32:
-        """Return one term's image, (tiles, 3, samples) float32; BTFs evaluate a texel per sample if that is fast."""
+    def _dense_image(self, index: int, is_canceled: CancelCheck) -> ShadedTerm | None:
+        """Shade a part of the light on a term at all samples; None if it takes too long. index: of the term"""
+        terms, snapshot = self.dense_terms, self.snapshots[index]
+        if index not in terms.diffuse | terms.glossy:
+            return None
+        shade_args = snapshot.target, snapshot.term, snapshot.bands, self.light, is_canceled
+        return shade_dense(*shade_args, is_bright_only=index in terms.glossy)
+
+    def _preview_image(
+        self, snapshot: _TermSnapshot, subset: SampleSubset, dense: ShadedTerm | None, is_canceled: CancelCheck
+    ) -> F32:
+        """Return one term's image, (tiles, 3, samples) float32; BTFs evaluate a texel per sample if that is fast.
+
+        dense: light of all samples, which is part of theirs; None for none.
+        """
         transfer, btf_ref = self.images.transfer, snapshot.term.texels
         incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
-            return _interpolate(
-                shade(snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled), subset.weights
-            )
+            shade_args = snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled
+            shaded = shade(*shade_args, preview_shader(self.images))
+            return _interpolate(shaded, subset, dense)
         receivers = self.images.unlit_samples(snapshot.target.material)
         return indirect_texel_light(
             btf_ref, collect_light(btf_ref, *incident, _ignore_progress, is_canceled), subset.weights, receivers
@@ -232,9 +276,22 @@ def _ignore_progress(fraction: float) -> None:
     """Ignore progress: a term of a preview takes milliseconds."""
 
 
-def _interpolate(shaded: ShadedTerm, weights: Any) -> F32:
-    """Interpolate an image of all samples from the shaded ones. (tiles, 3, samples) float32"""
-    return ShadedTerm.from_rows(weights @ shaded.rows(weights.shape[1])).image
+def _interpolate(shaded: ShadedTerm, subset: SampleSubset, dense: ShadedTerm | None) -> F32:
+    """Interpolate an image of all samples from the shaded ones, or its difference from `dense`, which is overwritten.
+
+    Returns:
+        (tiles, 3, samples) float32
+    """
+    num_samples, num_shaded = subset.weights.shape
+    tiles, lanes = tile_layout(num_samples)
+    rows = shaded.rows(num_shaded)
+    if dense is None:
+        image = np.zeros((tiles, 3, lanes), np.float32)
+    else:
+        image = dense.image
+        rows = rows - image[subset.sample_indices // lanes, :, subset.sample_indices % lanes]
+    add_interpolated(subset.weights, rows, image)
+    return image
 
 
 def _preview_job(situation: Situation) -> Job | None:
@@ -244,8 +301,9 @@ def _preview_job(situation: Situation) -> Job | None:
         missing = [target for target in situation.unconverged if not situation.can_reach(target)]
         if situation.is_opening and light.paths.direct and light.paths.has_indirect:
             light = direct_only(light)  # indirect light takes seconds if it is not cached
-        label = "a preview" if situation.is_opening else "the light"
-        return SparsePreview.for_targets(images, missing, light).job(label, situation.on_preview)
+        is_read = not situation.is_opening
+        label = "the light" if is_read else "a preview"
+        return SparsePreview.for_targets(images, missing, light, is_read=is_read).job(label, situation.on_preview)
     targets = situation.targets
     outdated = [t for t in targets if t.live.displays_outdated and not images.is_cached(t.material, t.live)]
     if outdated and situation.is_watched and _can_preview(images):
