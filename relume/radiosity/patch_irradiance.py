@@ -135,11 +135,18 @@ class PatchLight:
             lights: triangles of the environment. light_indices: their indices in the bake; None: all.
             is_preview: only at the first points; gather rays average over many patches.
         """
-        num_points = 1 if is_preview else self.points_per_patch
-        points = self.first_points(np.arange(self.num_patches)) if is_preview else self.points
-        bits = np.ascontiguousarray(self.visible[:, :num_points]).reshape(-1, self.visible.shape[2])
-        point_irradiance = irradiance(points.normal, self._select_visible(bits, light_indices), lights)
-        return np.asarray(point_irradiance.reshape(-1, num_points, 3).mean(axis=1, dtype=np.float64), np.float32)
+        if is_preview:
+            normal, bits = self._first_points
+            return irradiance(normal, self._select_visible(bits, light_indices), lights)
+        bits = self.visible.reshape(-1, self.visible.shape[2])
+        point_irradiance = irradiance(self.points.normal, self._select_visible(bits, light_indices), lights)
+        by_patch = point_irradiance.reshape(-1, self.points_per_patch, 3)
+        return np.asarray(by_patch.mean(axis=1, dtype=np.float64), np.float32)
+
+    @cached_property
+    def _first_points(self) -> tuple[Shaped[F32, "patches 3"], Shaped[NDArray[np.uint8], "patches bytes"]]:
+        """Normal and visibility of the first point of each patch."""
+        return self.points.normal[:: self.points_per_patch].copy(), np.ascontiguousarray(self.visible[:, 0])
 
     def visibility_bits(
         self, rows: Shaped[NDArray[np.intp], " G"], light_indices: Shaped[NDArray[np.intp], " M"] | None = None
@@ -172,7 +179,7 @@ class PatchLight:
         """
         points, visible = (
             self.first_points(rows),
-            self._select_visible(np.ascontiguousarray(self.visible[rows, 0]), light_indices),
+            self._select_visible(self._first_points[1][rows], light_indices),
         )
         return mean_coefficients(
             self.tangents(rows), points, incident_coefficients(points, visible, lights, (), degree)
@@ -234,6 +241,14 @@ class PatchLight:
         radiance = isotropic.copy()
         radiance[rows] += np.einsum("gj,gcj->gc", self._mean_outgoing_basis[rows], coefficients) if len(rows) else 0
         return radiance
+
+    def mean_reflectance(self, reflectance_operator: ReflectanceOperator) -> Shaped[F32, "G 3 J"]:
+        """Return the weights of directional incident light in the mean radiance toward other patches.
+
+        L̄ = Σ_j b̄_j Σ_k F_jk t_k = Σ_k (F b̄)_k t_k, with the mean b̄ of the basis in their directions: F is symmetric.
+        """
+        basis = np.repeat(self._mean_outgoing_basis[reflectance_operator.rows, None], 3, axis=1)
+        return reflectance_operator.apply(IncidentLight(np.zeros((self.num_patches, 3), np.float32), basis))[1]
 
     @cached_property
     def _mean_outgoing_basis(self) -> F32:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from enum import Enum
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.radiosity.bounce import bounces, one_bounce, preview_bounces
@@ -33,7 +34,7 @@ _ENERGY_CUTOFF = 0.1  # fraction of the light that highlights have reflected at 
 
 
 class Directions(Enum):
-    """Directions of light between patches: exact, by bins, or none after the first reflection.
+    """Directions of light between patches: exact, by bins, or none after the first reflection, see `solve_isotropic`.
 
     The latter two are approximations for edits; isotropic light uses few rays from its second bounce on.
     """
@@ -58,13 +59,10 @@ def solve_bounces(
         patches: patches of the bake. reflectance_operator: reflectance operator of the patches.
         incident: direct light. first: at least 1. last: at least `first`.
         outgoing_highlights: sharp highlights and their direct light; None: these use the low-degree basis.
-        directions: of light between patches.
+        directions: of light between patches, exact or binned.
     """
     gather_hits, rho = patches.gather_hits, reflectance_operator.reflectance
     first_outgoing = outgoing = first_bounce(reflectance_operator, incident, outgoing_highlights)
-    if directions is Directions.NONE:
-        isotropic = _bounce_times(first - 1, patches, reflectance_operator, outgoing.mean_to_others(patches))
-        return isotropic_radiance(preview_bounces(gather_hits, patches.few_rays, rho, isotropic, last - first))
     total, coefficients = (
         float(first == 1) * array.astype(np.float64)
         for array in (first_outgoing.isotropic, first_outgoing.coefficients)
@@ -86,6 +84,27 @@ def solve_bounces(
     return OutgoingRadiance(
         *outgoing_fields, first_outgoing.roughening, first_outgoing.bins if first == 1 else EMPTY_BINS
     )
+
+
+def solve_isotropic(
+    patches: PatchLight,
+    reflectance_operator: ReflectanceOperator,
+    incident: IncidentLight,
+    mean_reflectance: Shaped[F32, "G 3 J"],
+    first: int,
+    last: int,
+) -> OutgoingRadiance:
+    """Return the outgoing radiance of all patches by bounces, isotropic from the first reflection on, by few rays.
+
+    Args:
+        patches, reflectance_operator, incident, first, last: as in `solve_bounces`.
+        mean_reflectance: from `PatchLight.mean_reflectance`.
+    """
+    rows, rho = reflectance_operator.rows, reflectance_operator.reflectance
+    outgoing = np.asarray(rho / np.float32(np.pi) * incident.irradiance, np.float32)
+    outgoing[rows] += np.einsum("gck,gck->gc", mean_reflectance, incident.coefficients)
+    isotropic = _bounce_times(first - 1, patches, reflectance_operator, outgoing)
+    return isotropic_radiance(preview_bounces(patches.gather_hits, patches.few_rays, rho, isotropic, last - first))
 
 
 def _reflect(

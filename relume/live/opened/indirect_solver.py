@@ -18,7 +18,7 @@ from relume.radiosity.highlight_transport import outgoing_in_highlights
 from relume.radiosity.outgoing_radiance import OutgoingHighlights, OutgoingRadiance, isotropic_radiance
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import ReflectanceOperator
-from relume.radiosity.solve_bounces import Directions, solve_bounces
+from relume.radiosity.solve_bounces import Directions, solve_bounces, solve_isotropic
 from relume.transport.outgoing_patch_light import OutgoingLight
 from relume.views.view import View
 
@@ -211,6 +211,11 @@ class IndirectSolver:
         incident = direct_light.incident_light(
             light, reflectance_operator, is_preview=not approximation.has_exact_lights
         )
+        first, last = light.paths.first, light.paths.last
+        if approximation.directions is Directions.NONE:
+            key = self._key, "mean reflectance", reflectances
+            mean = self._cache.transient.get_value(key, lambda: patches.mean_reflectance(reflectance_operator))
+            return solve_isotropic(patches, reflectance_operator, incident, mean, first, last)
         outgoing_highlights = (
             _outgoing_highlights(
                 light, reflectance_operator, direct_light, is_preview=not approximation.has_exact_lights
@@ -218,7 +223,6 @@ class IndirectSolver:
             if approximation.has_sharp_highlights
             else None
         )
-        first, last = light.paths.first, light.paths.last
         return solve_bounces(
             patches, reflectance_operator, incident, first, last, outgoing_highlights, approximation.directions
         )
