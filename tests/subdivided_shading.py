@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 import relume.operators.shade
+from relume.live.fixed_camera.strategies import incremental_light, shading
 from relume.transport.projector import Projector
 
 
@@ -22,5 +23,6 @@ def shade_by_subdivision(term, contraction, lights, receivers, base_radiance=Non
 @pytest.fixture(scope="module", autouse=True)
 def shade_with_projector() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(relume.operators.shade, "Shader", shade_by_subdivision)
+        for module in (relume.operators.shade, shading, incremental_light):
+            patch.setattr(module, "Shader", shade_by_subdivision)
         yield

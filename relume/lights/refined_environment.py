@@ -56,7 +56,7 @@ def refine_environment(
     refined, new = refine_tiles(tiles, _texels_in(tiles, environment, rotation), metric, num_more)
     lights = integrate_environment(refined, environment, rotation)
     is_unbaked = np.ones(lights.num_lights, np.bool_)
-    is_unbaked[: len(ray_directions)] = _misses_light(ray_directions, lights)
+    is_unbaked[: len(ray_directions)] = misses_light(ray_directions, lights)
     is_unbaked[new] = True
     return RefinedEnvironment(refined, lights, np.flatnonzero(is_unbaked))
 
@@ -66,8 +66,8 @@ def _texels_in(tiles: Tiles, environment: EnvironmentTexels, rotation: float) ->
     return LightTexels(tiles.locate(directions), environment.luminous, directions, environment.solid_angles)
 
 
-def _misses_light(ray_directions: Shaped[F32, "M 3"], lights: TriangleLights) -> Shaped[NDArray[np.bool_], " M"]:
-    """Return which rays miss the middle of the light in their tile, the first M."""
+def misses_light(ray_directions: Shaped[F32, "M 3"], lights: TriangleLights) -> Shaped[NDArray[np.bool_], " M"]:
+    """Return which shadow rays of a bake miss the middle of the light in their tile, one of the first M."""
     num = len(ray_directions)
     cosine = np.einsum("mi,mi->m", ray_directions, lights.direction[:num])
     return np.asarray(np.arccos(np.clip(cosine, -1, 1)) > _MIDDLE * lights.radius[:num])

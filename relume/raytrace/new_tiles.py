@@ -35,50 +35,44 @@ class NewTiles(NamedTuple):
     tile: Shaped[NDArray[np.intp], " K"]
     direction: Shaped[NDArray[np.float32], "K 3"]
 
-    def unoccluded(self, points: SurfacePoints, baked: Shaped[Bits, "n bytes"]) -> Shaped[Bits, "n more_bytes"]:
-        """Return the visibility of all tiles at points to which nothing occludes them. baked: of the bake's tiles"""
-        above = np.packbits(points.normal @ self.direction.T > 0, axis=1, bitorder="little")
-        return self._insert(baked, above)
+    def unoccluded(self, points: SurfacePoints) -> Shaped[Bits, "n new_bytes"]:
+        """Return their visibility from points to which nothing occludes them."""
+        return np.packbits(points.normal @ self.direction.T > 0, axis=1, bitorder="little")
 
     def trace(
-        self,
-        scene: EmbreeScene,
-        points: SurfacePoints,
-        baked: Shaped[Bits, "n bytes"],
-        is_canceled: Callable[[], bool],
-    ) -> Shaped[Bits, "n more_bytes"]:
-        """Return the visibility of all tiles at points; that of the new ones is traced.
+        self, scene: EmbreeScene, points: SurfacePoints, is_canceled: Callable[[], bool]
+    ) -> Shaped[Bits, "n new_bytes"]:
+        """Return their visibility from points.
 
         Args:
-            scene: the occluding triangles. points, baked: with the visibility of the bake's tiles. is_canceled: polled.
+            scene: the occluding triangles. points: the points. is_canceled: polled.
         Raises:
             CancelledError: `is_canceled` returned true.
         """
-        batches = [np.empty((0, self._num_bytes), np.uint8)]
+        batches = [np.empty((0, (len(self.tile) + 7) // 8), np.uint8)]
         for start in range(0, points.num_points, _POINTS_PER_BATCH):
             if is_canceled():
                 raise CancelledError("the shadows of the environment were canceled")
-            batch = np.arange(start, min(start + _POINTS_PER_BATCH, points.num_points))
-            some = points.rows(batch)
-            traced = trace_visibility(scene, some.position, some.normal, self.direction, some.alpha_sample)
-            batches.append(self._insert(baked[batch], traced.visible))
+            some = points.rows(slice(start, start + _POINTS_PER_BATCH))
+            ray_args = scene, some.position, some.normal, self.direction, some.alpha_sample
+            batches.append(trace_visibility(*ray_args).visible)
         return np.concatenate(batches)
 
-    @property
-    def _num_bytes(self) -> int:
-        return (self.num_lights + 7) // 8
-
-    def _insert(self, baked: Bits, new: Bits) -> Bits:
-        out = np.zeros((len(baked), self._num_bytes), np.uint8)
-        out[:, : baked.shape[1]] = baked
-        parallel_for_chunks(lambda start, stop: _set_bits(new, self.tile, start, stop, out), len(out))
+    def insert(self, new: Shaped[Bits, "n new_bytes"], baked: Shaped[Bits, "n bytes"]) -> Shaped[Bits, "n all_bytes"]:
+        """Return the visibility of all tiles. new: theirs. baked: of the bake's tiles"""
+        out = np.empty((len(baked), (self.num_lights + 7) // 8), np.uint8)
+        parallel_for_chunks(lambda start, stop: _insert(new, baked, self.tile, start, stop, out), len(out))
         return out
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _set_bits(new, tile, start, stop, out):  # type: ignore[no-untyped-def]
-    """Copy bit k of points [start, stop) to bit tile[k]. new, out: light m of a point in bit m & 7 of byte m >> 3"""
+def _insert(new, baked, tile, start, stop, out):  # type: ignore[no-untyped-def]
+    """Write bits of points [start, stop): bit k of `new` to bit tile[k], all others from `baked`."""
     for p in range(start, stop):
+        for byte in range(baked.shape[1]):
+            out[p, byte] = baked[p, byte]
+        for byte in range(baked.shape[1], out.shape[1]):
+            out[p, byte] = 0
         for k in range(tile.shape[0]):
             byte, shift = tile[k] >> 3, np.uint8(tile[k] & 7)
             bit = (new[p, k >> 3] >> np.uint8(k & 7)) & np.uint8(1)

@@ -36,7 +36,7 @@ def traced():
 def test_new_tiles_are_traced_and_others_keep_their_bits(traced):
     scene, points, direction, baked, new = traced
     noisy = baked ^ np.packbits(np.isin(np.arange(24), NEW), bitorder="little")  # bits of replaced tiles do not matter
-    visible = bits(new.trace(scene, points, noisy, lambda: False))
+    visible = bits(new.insert(new.trace(scene, points, lambda: False), noisy))
     expected = bits(trace_visibility(scene, points.position, points.normal, direction).visible)
     np.testing.assert_array_equal(visible, expected)
     assert 0.05 < expected[:, NEW].mean() < 0.45  # half are below the horizon, and some occluded
@@ -46,10 +46,10 @@ def test_without_occluders_all_above_the_horizon_are_visible(traced):
     _, points, direction, _, new = traced
     above = points.normal @ direction.T > 0
     baked = np.packbits(above[:, :17], axis=1, bitorder="little")
-    np.testing.assert_array_equal(bits(new.unoccluded(points, baked)), above)
+    np.testing.assert_array_equal(bits(new.insert(new.unoccluded(points), baked)), above)
 
 
 def test_tracing_can_be_canceled(traced):
-    scene, points, _, baked, new = traced
+    scene, points, _, _, new = traced
     with pytest.raises(CancelledError, match="canceled"):
-        new.trace(scene, points, baked, lambda: True)
+        new.trace(scene, points, lambda: True)

@@ -25,7 +25,7 @@ from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.prefilter import downsampled, prefiltered
-from relume.lights.refined_environment import RefinedEnvironment, environment_metric, refine_environment
+from relume.lights.refined_environment import RefinedEnvironment, environment_metric, misses_light, refine_environment
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.lights.tile_subdivision import choose_tiles
@@ -84,6 +84,7 @@ from relume.views.view import View, open_view
 
 PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
+_NUM_STRONG, _STRONG = 4, 0.02  # tiles whose shadows a preview traces, with this part of all light
 
 F32 = NDArray[np.float32]
 FindLights = Callable[[EnvironmentKey, LightQuality], TriangleLights]
@@ -305,7 +306,7 @@ class BakedFixedViews:
             key = light.environment.unlinked
             lights, new_tiles = displayed_of(self.refined_environment(key).lights, light), self._new_tiles(key)
         else:
-            lights, new_tiles = self.direct_lights(light, quality), None
+            lights, new_tiles = self.direct_lights(light, quality), self._strong_tiles(light.environment, quality)
         receivers = samples.receivers(is_lit=lights.num_lights > 0, new_tiles=new_tiles, is_canceled=is_canceled)
         receivers = self._linked(receivers, light)
         rays: list[RayList] = []
@@ -347,6 +348,17 @@ class BakedFixedViews:
         _, lights, unbaked = self.refined_environment(environment)
         key = self.key, environment
         return NewTiles(key, lights.num_lights, unbaked, lights.direction[unbaked]) if len(unbaked) else None
+
+    def _strong_tiles(self, environment: EnvironmentKey, quality: LightQuality) -> NewTiles | None:
+        """Return the tiles with most light in a preview whose shadow rays miss it: a sun's shadow follows the sun."""
+        if quality is not LightQuality.PREVIEW or environment.unlinked == BAKED_ENVIRONMENT:
+            return None
+        lights = self.environment_lights(environment, quality)
+        power = lights.irradiance.sum(axis=1) * misses_light(self.shadow_ray_directions, lights)
+        strong = np.sort(np.argsort(-power, kind="stable")[:_NUM_STRONG])
+        strong = strong[power[strong] > _STRONG * lights.irradiance.sum()]
+        key = self.key, "strong tiles", environment.unlinked
+        return NewTiles(key, lights.num_lights, strong, lights.direction[strong]) if len(strong) else None
 
     def _linked(self, receivers: ShadingPoints, light: Illumination) -> ShadingPoints:
         """Return receivers whose visibility is zero where the environment does not light the surface."""

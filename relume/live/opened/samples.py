@@ -21,7 +21,6 @@ from relume.views.pixel_footprint import pixel_footprint
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
-Bits = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -49,11 +48,11 @@ class MaterialSamples:
         if new_tiles is None or not is_lit:
             return receivers
 
-        def trace() -> Bits:
-            return new_tiles.trace(self.local.embree, receivers.points, receivers.visible, is_canceled)
-
         key = *self.key, "visibility", new_tiles.key
-        return replace(receivers, visible=self.cache.transient.get_value(key, trace))
+        new = self.cache.transient.get_value(
+            key, lambda: new_tiles.trace(self.local.embree, receivers.points, is_canceled)
+        )
+        return replace(receivers, visible=new_tiles.insert(new, receivers.visible))
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays:
         """Read the gather rays, without light; missing ones are traced."""
@@ -130,10 +129,12 @@ class SelectedSamples:
             source, rows = self.source
             lit = source.receivers(is_lit=is_lit, new_tiles=new_tiles, is_canceled=is_canceled)
             return replace(self.points, visible=lit.visible[rows])
-        points, baked = self.points.points, self.points.visible
-        if not self.is_occluded:
-            return replace(self.points, visible=new_tiles.unoccluded(points, baked))
-        return replace(self.points, visible=new_tiles.trace(self.local.embree, points, baked, is_canceled))
+        points = self.points.points
+        if self.is_occluded:
+            new = new_tiles.trace(self.local.embree, points, is_canceled)
+        else:
+            new = new_tiles.unoccluded(points)
+        return replace(self.points, visible=new_tiles.insert(new, self.points.visible))
 
     def gather_rays(self, is_canceled: Callable[[], bool]) -> GatherRays | None:
         """Return the gather rays, without light."""

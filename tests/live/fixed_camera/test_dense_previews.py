@@ -7,8 +7,11 @@ import pytest
 from session_edits import BUDGET, kind_of, make_look, relative_rmse, run_until_exact
 
 from relume.core.cache import Cache
+from relume.lights.refined_environment import RefinedEnvironment
 from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.strategies.dense_light import find_dense_terms
+from relume.live.opened.fixed_views import BakedFixedViews
 from relume.views.pixel_blocks import block_sizes
 
 
@@ -18,8 +21,20 @@ def few(monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 300)
 
 
+@pytest.fixture(autouse=True)
+def in_baked_tiles(monkeypatch):
+    """Exact pictures and previews in the tiles of the bake, which are not divided for another environment."""
+
+    def refined_environment(bake, environment):
+        lights = bake.environment_lights(environment, LightQuality.EXACT)
+        return RefinedEnvironment(bake.tiles, lights, np.empty(0, np.intp))
+
+    monkeypatch.setattr(BakedFixedViews, "refined_environment", refined_environment)
+    monkeypatch.setattr(BakedFixedViews, "_strong_tiles", lambda *_: None)
+
+
 def turned(document):
-    document["environment"]["rotation"] = 70.0
+    document["environment"]["rotation"] = 71.25  # no other test has cached images of it
 
 
 def term_images(picture):
