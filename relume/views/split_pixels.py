@@ -28,18 +28,16 @@ from relume.scene.model import Camera
 from relume.transport.split_light import group_means
 
 F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
 
 _LEAST_CONTRAST = 3.0  # by the mean radiance
-_POINTS, _EXPONENT = 5.0, 2 / 3  # of a pixel by its contrast c: 5 c^⅔, the fewest for the sum of squared errors
-_MIN_SIDE, _MAX_SIDE = 3, 12  # points along a side of a pixel
+_SIDES = 8, 4  # points along each side of a pixel: with the strongest contrast, and with others
 
 
 class SplitLimits(NamedTuple):
-    """Largest number of samples that are split, and about the largest number of points of all."""
+    """Largest numbers of samples that are split: with the strongest contrast, and others."""
 
-    num_samples: int
-    num_points: int
+    num_strong: int
+    num_weak: int
 
 
 class PixelPoints(NamedTuple):
@@ -75,7 +73,7 @@ def choose_splits(
 
     Args:
         pixel: of each sample of one material. size: of the image, pixels. radiance: of one term at each.
-        limits: see `SplitLimits`.
+        limits: numbers of samples.
     Returns:
         Their rows, ascending; and the number of points along a side of the pixel of each.
     """
@@ -84,15 +82,9 @@ def choose_splits(
     contrast = np.empty(len(value), np.float32)
     _find_contrast(pixel, value, extremes, contrast)
     strong = np.flatnonzero(contrast > _LEAST_CONTRAST * value.mean(dtype=np.float64))
-    rows = np.sort(strong[np.argsort(-contrast[strong], kind="stable")][: limits.num_samples])
-    return rows, _choose_sides(contrast[rows] / value.mean(dtype=np.float64), limits.num_points)
-
-
-def _choose_sides(contrast: Shaped[F64, " k"], max_points: int) -> Shaped[NDArray[np.intp], " k"]:
-    """Choose the number of points along a side of each pixel. contrast: by the mean. max_points: of all pixels"""
-    num_points = np.clip(_POINTS * contrast**_EXPONENT, _MIN_SIDE**2, _MAX_SIDE**2)
-    scale = min(1.0, max_points / max(float(num_points.sum()), 1.0))
-    return np.maximum(np.sqrt(scale * num_points).round(), 1).astype(np.intp)
+    strong = strong[np.argsort(-contrast[strong], kind="stable")][: limits.num_strong + limits.num_weak]
+    order = np.argsort(strong)
+    return strong[order], np.where(np.arange(len(strong)) < limits.num_strong, *_SIDES)[order]
 
 
 @nb.njit(nogil=True, cache=True)

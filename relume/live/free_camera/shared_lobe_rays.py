@@ -35,7 +35,7 @@ MAX_RAYS = 60_000
 
 _MOST_RAYS = 8  # of a point
 _SEED = 1
-_SPLITS = SplitLimits(512, 12_288)  # points whose reflections are averaged over their pixels, and of these
+_SPLITS = SplitLimits(128, 384)  # points whose reflections are averaged over their pixels
 _STEP_X, _STEP_Y = 1 / 1.32471795724474602596, 1 / 1.32471795724474602596**2  # R2 sequence: spreads points evenly
 _REACH, _MAX_REACH = 2, 32  # pixels from which rays are shared, and where there are none nearer
 _BLOCK = 16  # pixels along each side: the first point in each block has rays, so that small pieces have some in reach

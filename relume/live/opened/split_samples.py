@@ -25,7 +25,7 @@ from relume.views.view import View
 
 F32 = NDArray[np.float32]
 
-_LIMITS = SplitLimits(4096, 98304)
+_LIMITS = SplitLimits(1024, 3072)  # 114,688 points
 _PRIMARY = 1e-5  # of the camera's distance from the world's origin, below which a ray starts at it
 
 
