@@ -48,7 +48,7 @@ def test_wide_lobes_and_diffuse_light_need_no_division():
 
 
 def test_many_points_are_shaded_as_each_alone(lights, receivers):
-    few = lights.select(np.arange(16), lights.irradiance[:16]).ungrouped()
+    few = lights.select(np.arange(16), lights.irradiance[:16])
     points = ref.only_above(receivers, few)
     shader = UndividedShader(*contraction_of("cook_torrance", {}), few, points)
     alone = np.concatenate([shader.project(p, p + 1) for p in range(NUM_POINTS)])
