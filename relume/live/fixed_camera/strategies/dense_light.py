@@ -30,7 +30,7 @@ from relume.transport.shading.shader import UndividedShader
 from relume.transport.shading_points import ShadingPoints
 from relume.views.pixel_blocks import block_sizes
 
-_MAX_PAIRS = 5 * 10**8  # of samples of Lambertian terms and lights: 0.1 s of processor time
+_MAX_PAIRS = 8 * 10**8  # of samples of Lambertian terms and lights: 0.15 s of processor time
 _MAX_GLOSSY = 100_000  # samples of other terms: 0.1 s of processor time
 _NUM_BRIGHT = 48  # lights of which their highlights are
 _LEAST_PART = 3e-3  # of the peak of a curve: the rest of a highlight is interpolated
