@@ -22,13 +22,13 @@ from relume.core.thread_pools import parallel_for_cancellable, parallel_for_chun
 from relume.math.haar import coefficient_levels, haar
 from relume.operators.indirect_kernel import (
     BLOCK_SAMPLES,
-    add_filtered,
     apply_rows,
     number_patches,
     select_coefficients,
     sum_by_patch,
     transform,
 )
+from relume.operators.interpolation import add_interpolated
 from relume.patches.neighbor_filter import FilterWeights
 from relume.transport.outgoing_patch_light import isotropic
 from relume.transport.ray_projector import RayProjector
@@ -76,10 +76,7 @@ class IndirectOperator:
         matrix, num_passes = self.neighbor_weights
         for _ in range(num_passes - 1):
             unfiltered[: self.num_samples] = matrix @ unfiltered[: self.num_samples]
-        filter_rows = (matrix.indptr, matrix.indices, matrix.data)
-        parallel_for_chunks(
-            lambda start, stop: add_filtered(*filter_rows, unfiltered, start, stop, image), self.num_samples
-        )
+        add_interpolated(matrix, unfiltered, image)
 
 
 def row_bytes(num_samples: int, num_channels: int) -> int:

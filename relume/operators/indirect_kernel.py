@@ -163,25 +163,3 @@ def apply_rows(coefficients, scale, rows, light, start, stop, unfiltered):  # ty
         first = block * BLOCK_SAMPLES
         for s in range(BLOCK_SAMPLES):
             unfiltered[first + s, 0], unfiltered[first + s, 1], unfiltered[first + s, 2] = red[s], green[s], blue[s]
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def add_filtered(first, neighbors, weight, unfiltered, start, stop, image):  # type: ignore[no-untyped-def]
-    """Add filtered samples to samples [start, stop) of an image.
-
-    Args:
-        first, neighbors, weight: rows of `relume.views.gather_filter`, compressed. unfiltered: from `apply_rows`.
-        image: (tiles, 3, samples) float32
-    """
-    samples = image.shape[2]
-    for s in range(start, stop):
-        red = green = blue = np.float32(0)
-        for k in range(first[s], first[s + 1]):
-            w, neighbor = weight[k], np.uint32(neighbors[k])
-            red += w * unfiltered[neighbor, 0]
-            green += w * unfiltered[neighbor, 1]
-            blue += w * unfiltered[neighbor, 2]
-        tile, offset = s // samples, s % samples
-        image[tile, 0, offset] += red
-        image[tile, 1, offset] += green
-        image[tile, 2, offset] += blue

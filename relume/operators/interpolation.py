@@ -1,4 +1,4 @@
-"""Interpolation of an image of a term from some of its samples."""
+"""Images of a term whose samples are weighted means of a few rows: of shaded samples, or of neighbors."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def _add_interpolated(first, column, weight, rows, start, stop, image):  # type:
         image[tile, 2, lane] += blue
 
 
-def add_interpolated(weights: Any, rows: Shaped[F32, "k 3"], image: Shaped[F32, "tiles 3 lanes"]) -> None:
+def add_interpolated(weights: Any, rows: Shaped[F32, "k channels"], image: Shaped[F32, "tiles 3 lanes"]) -> None:
     """Add W rows to an image, in place, as `weights @ rows` without temporary images.
 
     Args:
-        weights: W, sparse float32 in CSR format. (samples, k) rows: of the k samples.
+        weights: W, sparse float32 in CSR format. (samples, k) rows: at least k, of at least three channels.
         image: of all samples, padded to whole tiles.
     """
     args = weights.indptr, weights.indices, weights.data, rows

@@ -15,7 +15,7 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.surface_points import SurfacePoints
-from relume.raytrace.visibility import trace_visibility
+from relume.raytrace.visibility import above_horizon, trace_visibility
 
 Bits = NDArray[np.uint8]
 
@@ -37,7 +37,7 @@ class NewTiles(NamedTuple):
 
     def unoccluded(self, points: SurfacePoints) -> Shaped[Bits, "n new_bytes"]:
         """Return their visibility from points to which nothing occludes them."""
-        return np.packbits(points.normal @ self.direction.T > 0, axis=1, bitorder="little")
+        return above_horizon(points.normal, self.direction)
 
     def trace(
         self, scene: EmbreeScene, points: SurfacePoints, is_canceled: Callable[[], bool]

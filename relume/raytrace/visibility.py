@@ -120,6 +120,11 @@ def trace_visibility(
     return VisibilityBits(bits, sum(counts), time.perf_counter() - start_time)
 
 
+def above_horizon(normals: Shaped[F32, "n 3"], directions: Shaped[F32, "m 3"]) -> Shaped[NDArray[np.uint8], "n bytes"]:
+    """Return the visibility of lights that nothing occludes: all above the horizons, bits as in `VisibilityBits`."""
+    return np.packbits(normals @ directions.T > 0, axis=1, bitorder="little")
+
+
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _select_bits(visible, rows, lights, start, stop, out):  # type: ignore[no-untyped-def]
     for i in range(start, stop):

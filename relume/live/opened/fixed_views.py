@@ -70,7 +70,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.new_tiles import NewTiles
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
-from relume.raytrace.visibility import select_visibility
+from relume.raytrace.visibility import above_horizon, select_visibility
 from relume.store.bake_protocol import StoreReader
 from relume.transport.lobe_rays import NO_ENVIRONMENT, NO_PEAKS, LobeEnvironment, LobePeaks, LobeRays
 from relume.transport.lobe_scene import LobeScene
@@ -289,7 +289,7 @@ class BakedFixedViews:
 
     def unoccluded_samples(self, points: SurfacePoints) -> Samples:
         """Return points to which nothing occludes the environment. See `FixedViewTransfer`."""
-        visible = np.packbits(points.normal @ self.shadow_ray_directions.T > 0, axis=1, bitorder="little")
+        visible = above_horizon(points.normal, self.shadow_ray_directions)
         return SelectedSamples(ShadingPoints(points, points.normal, visible), self.local, is_occluded=False)
 
     def incident_light(

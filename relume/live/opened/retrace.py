@@ -19,7 +19,7 @@ from relume.patches.patch_kdtree import PatchTree
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
-from relume.raytrace.visibility import trace_visibility
+from relume.raytrace.visibility import above_horizon, trace_visibility
 from relume.store.bake_protocol import StoreReader
 
 F32 = NDArray[np.float32]
@@ -56,8 +56,7 @@ class NormalRetracer:
         ).visible
         for start in range(0, len(visible), _POINTS_PER_BATCH):
             batch = slice(start, start + _POINTS_PER_BATCH)
-            above = np.packbits(points.normal[batch] @ directions.T > 0, axis=1, bitorder="little")
-            visible[batch] |= baked_bits[batch] & above
+            visible[batch] |= baked_bits[batch] & above_horizon(points.normal[batch], directions)
         return visible
 
     def gather_hits(

@@ -18,6 +18,7 @@ from relume.lights.spherical_triangles import TriangleLights, tessellate_environ
 from relume.live.fixed_camera.target import TargetTerm
 from relume.operators.shade import shade
 from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.visibility import above_horizon
 from relume.scene.model import Texture
 from relume.scene.texture_encoding import decode
 from relume.transport.shading_points import ShadingPoints
@@ -77,7 +78,7 @@ def _shading_points(x: NDArray[np.float64], y: NDArray[np.float64]) -> ShadingPo
     normal = np.stack([x, y, np.sqrt(1.0 - x**2 - y**2)], axis=-1).astype(np.float32)
     tangent = np.stack([normal[:, 2], np.zeros(len(x), np.float32), -normal[:, 0]], axis=-1)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    visible = np.packbits(normal @ _lights().direction.T > 0, axis=1, bitorder="little")
+    visible = above_horizon(normal, _lights().direction)
     points = SurfacePoints(normal, normal, tangent, np.arange(len(x), dtype=np.uint32))
     # a texture repeats four times around the sphere, upright
     azimuth, elevation = 2 * np.arctan2(x, normal[:, 2]) / np.pi, 2 * np.arcsin(y) / np.pi
