@@ -16,6 +16,7 @@ from fastapi.testclient import TestClient
 from session_client import Baked
 
 from relume.core.cache import Cache
+from relume.core.filesystem import atomic_write
 from relume_server.io import streamed_responses as answers_module
 from relume_server.io.streamed_responses import StreamedResponses
 from relume_server.runtime.single_flight import SingleFlight
@@ -134,7 +135,8 @@ class TestThumbnails:
             painted.append(bake)
             may_end.wait()
             services.thumbnails.path(bake).parent.mkdir(exist_ok=True)
-            services.thumbnails.path(bake).write_bytes(b"it")
+            with atomic_write(services.thumbnails.path(bake)) as path:  # requests still arrive
+                path.write_bytes(b"it")
 
         monkeypatch.setattr(services.thumbnails, "paint", paint)
         url = f"/api/scenes/{baked.scene}/thumbnail.webp"
