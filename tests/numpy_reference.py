@@ -215,7 +215,7 @@ def gather_incident_light(transfer, view: View, index, look):
 
 def trace_environment(transfer, view: View, index, environment):
     """Triangles of an environment and a material's samples: what the bake lacks is traced ray by ray."""
-    receivers, (_, lights, unbaked) = view.receivers(index), transfer.refined_environment(environment)
+    receivers, (_, lights, unbaked) = view.receivers(index), transfer.refined.exact(environment)
     points, directions = receivers.points, lights.direction[unbaked]
     ray_args = transfer.local.embree, points.position, points.normal, directions, points.alpha_sample
     bits = np.zeros((points.num_points, lights.num_lights), np.uint8)

@@ -35,6 +35,8 @@ UNIFORM_FRACTION = 1e-2
 # (docs/direct-light.md#environment-triangles).
 _RELIGHTABLE_UNIFORM_FRACTION = 0.1
 
+_SLACK = 0.999  # of a metric, which depends on the order of sums
+
 _OCTANTS = Tiles(np.arange(8, 16, dtype=np.uint64))
 
 
@@ -49,43 +51,52 @@ class _Subdivision:
 
     Args:
         tiles: the first leaves. texels: light in them. uniform_fraction: weight of plain solid angle.
+        metric: leaves of smaller ones are not divided, as a fraction of all light.
     """
 
-    def __init__(self, tiles: Tiles, texels: LightTexels, uniform_fraction: float) -> None:
-        self.texels, self.uniform = texels, uniform_fraction * float(texels.luminous.sum()) / (4 * np.pi)
+    def __init__(self, tiles: Tiles, texels: LightTexels, uniform_fraction: float, metric: float = 0.0) -> None:
+        self.texels, self.all_light = texels, float(texels.luminous.sum())
+        self.uniform = uniform_fraction * self.all_light / (4 * np.pi)
+        self.metric = metric
         self.heap: list[tuple[float, int, int, F64, NDArray[np.int64]]] = []
-        self.count = 0
+        self.count = len(tiles.codes)
+        light, extent = (texels.sums(values, self.count) for values in (texels.luminous, texels.solid_angles))
+        is_large = self._metric(light, extent) >= _SLACK * metric * self.all_light
+        self.small = [(k, int(tiles.codes[k])) for k in np.flatnonzero(~is_large)]
         order = np.argsort(texels.tile, kind="stable")
-        first = np.searchsorted(texels.tile[order], np.arange(len(tiles.codes) + 1))
-        for k, (code, corners) in enumerate(zip(map(int, tiles.codes), tiles.corners, strict=True)):
-            self._push(code, corners, order[first[k] : first[k + 1]])
+        first = np.searchsorted(texels.tile[order], np.arange(self.count + 1))
+        for k in np.flatnonzero(is_large):
+            self._push(int(k), int(tiles.codes[k]), tiles.corners[k], order[first[k] : first[k + 1]])
 
-    def _push(self, code: int, corners: F64, texels: NDArray[np.int64]) -> None:
-        light = float(self.texels.luminous[texels].sum())
-        extent = float(self.texels.solid_angles[texels].sum())
-        metric = light * max(extent, 1e-12) ** SOLID_ANGLE_EXPONENT + self.uniform * extent
+    def _metric(self, light: F64, extent: F64) -> F64:
+        """Return the metric of leaves, times all light. light, extent: in each, and its solid angle"""
+        return np.asarray(light * np.maximum(extent, 1e-12) ** SOLID_ANGLE_EXPONENT + self.uniform * extent)
+
+    def _push(self, index: int, code: int, corners: F64, texels: NDArray[np.int64]) -> None:
+        light, extent = self.texels.luminous[texels].sum(), self.texels.solid_angles[texels].sum()
         # leaves with fewer than two texels have no more detail: last in the queue
         can_split = len(texels) > 1 and code.bit_length() < 4 + 2 * MAX_DEPTH
-        heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, corners, texels))
-        self.count += 1
+        heapq.heappush(
+            self.heap, (-float(self._metric(light, extent)) if can_split else 0.0, index, code, corners, texels)
+        )
 
     @property
     def largest_metric(self) -> float:
         """Largest metric of a leaf that can be split, as a fraction of all light; zero if there is none."""
-        return -self.heap[0][0] / max(float(self.texels.luminous.sum()), 1e-30)
+        return -self.heap[0][0] / max(self.all_light, 1e-30) if self.heap else 0.0
 
-    def split_until(self, num_leaves: int, metric: float = 0.0) -> Tiles:
+    def split_until(self, num_leaves: int) -> Tiles:
         """Split the leaves of largest metric.
 
         Args:
-            num_leaves: maximum number of leaves. metric: largest that remains, see `largest_metric`.
+            num_leaves: maximum number of leaves.
         Returns:
             The leaves, in the order of their creation.
         """
-        while len(self.heap) + 3 <= num_leaves and self.largest_metric > metric:
+        while len(self.heap) + len(self.small) + 3 <= num_leaves and self.largest_metric > self.metric:
             self._split_largest()
-        leaves = sorted(self.heap, key=lambda leaf: leaf[1])  # keeps neighbors together
-        return Tiles(np.array([leaf[2] for leaf in leaves], np.uint64))
+        leaves = sorted([*self.small, *(leaf[1:3] for leaf in self.heap)])  # keeps neighbors together
+        return Tiles(np.array([code for _, code in leaves], np.uint64))
 
     def _split_largest(self) -> None:
         """Replace the leaf of largest metric by its four children."""
@@ -93,7 +104,8 @@ class _Subdivision:
         child_index = np.empty(len(texels), np.int8)
         _find_children(texels, self.texels.directions, middle_edges(corners[None])[0], child_index)
         for child, child_corners in enumerate(children_of(corners[None])[0]):
-            self._push(4 * code + child, child_corners, texels[child_index == child])
+            self._push(self.count, 4 * code + child, child_corners, texels[child_index == child])
+            self.count += 1
 
 
 def choose_tiles(radiance: Shaped[F32, "height width 3"], num_lights: int, relightable: bool = False) -> Tiles:
@@ -147,7 +159,7 @@ def refine_tiles(tiles: Tiles, texels: LightTexels, metric: float, num_more: int
         tiles: M tiles. texels: light in them. metric: that no tile exceeds then, as a fraction of all light.
         num_more: maximum number of tiles by which M grows.
     """
-    codes = _Subdivision(tiles, texels, UNIFORM_FRACTION).split_until(len(tiles.codes) + num_more, metric).codes
+    codes = _Subdivision(tiles, texels, UNIFORM_FRACTION, metric).split_until(len(tiles.codes) + num_more).codes
     is_divided, is_new = ~np.isin(tiles.codes, codes), ~np.isin(codes, tiles.codes)
     new = np.concatenate([np.flatnonzero(is_divided), np.arange(len(tiles.codes), len(codes))])
     refined = np.concatenate([tiles.codes, codes[: len(codes) - len(tiles.codes)]])

@@ -369,6 +369,25 @@ class FixedViewTransfer(OpenBake, Protocol):
         """
         ...
 
+    def preview_highlights(
+        self,
+        samples: Samples,
+        light: Illumination,
+        is_canceled: Callable[[], bool] = lambda: False,
+        max_lights: int | None = None,
+    ) -> LightsAndPoints:
+        """Return the incident light at samples for the highlights of a preview: triangles follow the light.
+
+        The visibility of these triangles is that of the tiles of the bake that they are in.
+
+        Args:
+            samples, light, is_canceled: as in `incident_light`.
+            max_lights: of the environment, the brightest; None: all.
+        Raises:
+            CancelledError: `is_canceled` returned true.
+        """
+        ...
+
     def split_light(
         self,
         view: View,

@@ -221,6 +221,13 @@ class ViewImages:
         samples = self.transfer.samples(self.view, material.index, self.cache)
         return self.transfer.incident_light(samples, light, quality, is_canceled, lobe, patch_light)
 
+    def preview_highlights(
+        self, material: MaterialImage, light: Illumination, is_canceled: Callable[[], bool], max_lights: int
+    ) -> LightsAndPoints:
+        """Return the brightest light at the samples of a material. See `FixedViewTransfer.preview_highlights`."""
+        samples = self.transfer.samples(self.view, material.index, self.cache)
+        return self.transfer.preview_highlights(samples, light, is_canceled, max_lights)
+
     def split_light(
         self,
         material: MaterialImage,

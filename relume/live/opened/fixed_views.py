@@ -25,10 +25,8 @@ from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.prefilter import downsampled, prefiltered
-from relume.lights.refined_environment import RefinedEnvironment, environment_metric, misses_light, refine_environment
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
-from relume.lights.tile_subdivision import choose_tiles
 from relume.live.fixed_camera.illumination import (
     Illumination,
     emission_images,
@@ -58,6 +56,7 @@ from relume.live.opened.lobe_light import (
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.object_material_store import ObjectMaterialStore
 from relume.live.opened.own_images import OwnImages
+from relume.live.opened.refined_environments import PREVIEW_WIDTH, RefinedEnvironments
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
@@ -67,7 +66,6 @@ from relume.look.object_materials import ObjectMaterials
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.patches.patch_kdtree import NO_PATCH
-from relume.raytrace.new_tiles import NewTiles
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility import above_horizon, select_visibility
@@ -82,9 +80,7 @@ from relume.views.frost_filter import GLOW_WIDTH, MAX_FROSTED_RATIO, RAY_SPACING
 from relume.views.split_pixels import with_normals
 from relume.views.view import View, open_view
 
-PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
-_NUM_STRONG, _STRONG = 4, 0.02  # tiles whose shadows a preview traces, with this part of all light
 
 F32 = NDArray[np.float32]
 FindLights = Callable[[EnvironmentKey, LightQuality], TriangleLights]
@@ -302,11 +298,12 @@ class BakedFixedViews:
         patch_light: Illumination | None = None,
     ) -> LightsAndPoints:
         """Return the incident light at samples. See `FixedViewTransfer`."""
+        key = light.environment.unlinked
         if lobe is not None or quality is LightQuality.EXACT:
-            key = light.environment.unlinked
-            lights, new_tiles = displayed_of(self.refined_environment(key).lights, light), self._new_tiles(key)
+            lights, new_tiles = displayed_of(self.refined.exact(key).lights, light), self.refined.new_tiles(key)
         else:
-            lights, new_tiles = self.direct_lights(light, quality), self._strong_tiles(light.environment, quality)
+            lights = self.direct_lights(light, quality)
+            new_tiles = self.refined.strong_tiles(key) if quality is LightQuality.PREVIEW else None
         receivers = samples.receivers(is_lit=lights.num_lights > 0, new_tiles=new_tiles, is_canceled=is_canceled)
         receivers = self._linked(receivers, light)
         rays: list[RayList] = []
@@ -320,45 +317,28 @@ class BakedFixedViews:
         rays += [*self._mirror_rays(samples, light, followed), *samples.local_rays(light, receivers.points)]
         return lights, replace(receivers, rays=tuple(rays))
 
-    def refined_environment(self, environment: EnvironmentKey) -> RefinedEnvironment:
-        """Return an environment in the tiles in which samples show it exactly.
+    @cached_property
+    def refined(self) -> RefinedEnvironments:
+        """Environments in tiles that are small where their light is."""
+        return RefinedEnvironments(self)
 
-        Raises:
-            NotFoundError: the environment does not exist here. SceneError: its files are damaged.
-        """
-        # the tiles of a relightable bake were chosen for any environment: none is exact in them alone
-        is_relightable = bool(self.store.attributes["relightable"])
-        if environment == BAKED_ENVIRONMENT and not is_relightable:
-            return RefinedEnvironment(self.tiles, self.lights, np.empty(0, np.intp))
-
-        def find_metric() -> float:
-            radiance = self.environment_radiance(None)
-            own = choose_tiles(radiance, len(self.tiles.codes)) if is_relightable else self.tiles
-            return environment_metric(own, EnvironmentTexels.from_radiance(radiance))
-
-        def refine() -> RefinedEnvironment:
-            texels = EnvironmentTexels.from_radiance(self.environment_radiance(environment.map))
-            metric = self.cache.get_value((self.key, "metric of tiles"), find_metric)
-            return refine_environment(self.tiles, self.shadow_ray_directions, texels, environment.rotation, metric)
-
-        return self.cache.get_value((self.key, "refined environment", environment), refine)
-
-    def _new_tiles(self, environment: EnvironmentKey) -> NewTiles | None:
-        """Return the tiles of an environment whose visibility is not baked; None if there are none."""
-        _, lights, unbaked = self.refined_environment(environment)
-        key = self.key, environment
-        return NewTiles(key, lights.num_lights, unbaked, lights.direction[unbaked]) if len(unbaked) else None
-
-    def _strong_tiles(self, environment: EnvironmentKey, quality: LightQuality) -> NewTiles | None:
-        """Return the tiles with most light in a preview whose shadow rays miss it: a sun's shadow follows the sun."""
-        if quality is not LightQuality.PREVIEW or environment.unlinked == BAKED_ENVIRONMENT:
-            return None
-        lights = self.environment_lights(environment, quality)
-        power = lights.irradiance.sum(axis=1) * misses_light(self.shadow_ray_directions, lights)
-        strong = np.sort(np.argsort(-power, kind="stable")[:_NUM_STRONG])
-        strong = strong[power[strong] > _STRONG * lights.irradiance.sum()]
-        key = self.key, "strong tiles", environment.unlinked
-        return NewTiles(key, lights.num_lights, strong, lights.direction[strong]) if len(strong) else None
+    def preview_highlights(
+        self,
+        samples: Samples,
+        light: Illumination,
+        is_canceled: Callable[[], bool] = lambda: False,
+        max_lights: int | None = None,
+    ) -> LightsAndPoints:
+        """Return the incident light at samples for the highlights of a preview. See `FixedViewTransfer`."""
+        lights, receivers = self.incident_light(samples, light, LightQuality.PREVIEW, is_canceled)
+        if not lights.num_lights:
+            return lights, receivers
+        lights, baked = self.refined.of_highlights(light.environment.unlinked)
+        lights = displayed_of(lights, light)
+        power = lights.irradiance.sum(axis=1)
+        brightest = np.sort(np.argsort(-power, kind="stable")[:max_lights])
+        visible = select_visibility(receivers.visible, np.arange(receivers.points.num_points), baked[brightest])
+        return lights.select(brightest, lights.irradiance[brightest]), replace(receivers, visible=visible)
 
     def _linked(self, receivers: ShadingPoints, light: Illumination) -> ShadingPoints:
         """Return receivers whose visibility is zero where the environment does not light the surface."""
@@ -388,7 +368,7 @@ class BakedFixedViews:
 
     def _shared_triangles(self, light: Illumination, lobe: LobeSampling) -> NDArray[np.intp]:
         """Return the triangles that share their light with rays: all, if wide levels have no rays."""
-        lights = self.refined_environment(light.environment.unlinked).lights
+        lights = self.refined.exact(light.environment.unlinked).lights
         return bright_triangles(lights) if lobe.is_narrow.all() else np.arange(lights.num_lights)
 
     def _lobe_rays(
@@ -473,7 +453,7 @@ class BakedFixedViews:
     def _lobe_environment(self, light: Illumination, shared: NDArray[np.intp]) -> tuple[LobeEnvironment, LobePeaks]:
         """Return the environment for lobe rays. shared: triangles that share their light with them"""
         key, rotation = light.environment.unlinked, light.environment.rotation
-        radiance, refined = self.environment_map(key.map), self.refined_environment(key)
+        radiance, refined = self.environment_map(key.map), self.refined.exact(key)
 
         def tiles_of_texels(tiles: Tiles) -> NDArray[np.int32]:
             texel_args = radiance.shape[:2], rotation

@@ -11,7 +11,7 @@ from relume.lights.refined_environment import RefinedEnvironment
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.strategies.dense_light import find_dense_terms
-from relume.live.opened.fixed_views import BakedFixedViews
+from relume.live.opened.refined_environments import LightsOfHighlights, RefinedEnvironments
 from relume.views.pixel_blocks import block_sizes
 
 
@@ -25,12 +25,18 @@ def few(monkeypatch):
 def in_baked_tiles(monkeypatch):
     """Exact pictures and previews in the tiles of the bake, which are not divided for another environment."""
 
-    def refined_environment(bake, environment):
+    def exact(environments, environment):
+        bake = environments._bake
         lights = bake.environment_lights(environment, LightQuality.EXACT)
         return RefinedEnvironment(bake.tiles, lights, np.empty(0, np.intp))
 
-    monkeypatch.setattr(BakedFixedViews, "refined_environment", refined_environment)
-    monkeypatch.setattr(BakedFixedViews, "_strong_tiles", lambda *_: None)
+    def of_highlights(environments, environment):
+        lights = environments._bake.environment_lights(environment, LightQuality.PREVIEW)
+        return LightsOfHighlights(lights, np.arange(lights.num_lights))
+
+    monkeypatch.setattr(RefinedEnvironments, "exact", exact)
+    monkeypatch.setattr(RefinedEnvironments, "of_highlights", of_highlights)
+    monkeypatch.setattr(RefinedEnvironments, "strong_tiles", lambda *_: None)
 
 
 def turned(document):

@@ -8,31 +8,26 @@ lights, which takes 1 µs for each sample.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.core.thread_pools import parallel_for_chunks
-from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination, direct_environment
 from relume.live.fixed_camera.jobs import CancelCheck
 from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.operators.shade import ShadedTerm, shade_rows
-from relume.raytrace.visibility import select_visibility
 from relume.transport.diffuse_projector import is_constant
 from relume.transport.roughness_ranges import contract_levels
 from relume.transport.shading.shader import UndividedShader
-from relume.transport.shading_points import ShadingPoints
 from relume.views.pixel_blocks import block_sizes
 
 _MAX_PAIRS = 8 * 10**8  # of samples of Lambertian terms and lights: 0.15 s of processor time
 _MAX_GLOSSY = 100_000  # samples of other terms: 0.1 s of processor time
-_NUM_BRIGHT = 48  # lights of which their highlights are
+_NUM_BRIGHT = 64  # lights of which their highlights are
 _LEAST_PART = 3e-3  # of the peak of a curve: the rest of a highlight is interpolated
 _MIN_UNDIVIDED = 500  # lights of the environment: their triangles are smaller than most highlights
 _BYTES_PER_SAMPLE = 80  # without visibility
@@ -111,9 +106,11 @@ def shade_dense(
         is_bright_only: in the light of the brightest triangles alone.
     """
     direct = direct_environment(light)
-    lights, receivers = target.images.incident_light(target.material, direct, is_canceled, LightQuality.PREVIEW)
+    light_args = target.material, direct, is_canceled
     if is_bright_only:
-        lights, receivers = _brightest(lights, receivers)
+        lights, receivers = target.images.preview_highlights(*light_args, _NUM_BRIGHT)
+    else:
+        lights, receivers = target.images.incident_light(*light_args, LightQuality.PREVIEW)
     contractions = [each.without_tails(_LEAST_PART) for each in contract_levels(term, bands, None)]
     rows, make_shader = np.empty_like(receivers.normal), preview_shader(target.images)
 
@@ -122,15 +119,6 @@ def shade_dense(
 
     parallel_for_chunks(shade_range, len(rows))
     return ShadedTerm.from_rows(rows)
-
-
-def _brightest(lights: TriangleLights, receivers: ShadingPoints) -> tuple[TriangleLights, ShadingPoints]:
-    """Return the lights with the most irradiance, and their visibility."""
-    power = lights.irradiance.sum(axis=1)
-    bright: Shaped[NDArray[np.intp], " N"] = np.sort(np.argsort(-power, kind="stable")[:_NUM_BRIGHT])
-    visible = select_visibility(receivers.visible, np.arange(receivers.points.num_points), bright)
-    selected = lights.select(bright, lights.irradiance[bright])
-    return selected, replace(receivers, visible=visible)
 
 
 def is_dense_alone(light: Illumination) -> bool:

@@ -241,7 +241,10 @@ class SparsePreview:
         dense: light of all samples, which is part of theirs; None for none.
         """
         transfer, btf_ref = self.images.transfer, snapshot.term.texels
-        incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
+        if snapshot.term.is_lambertian:
+            incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
+        else:
+            incident = transfer.preview_highlights(subset.samples, self.light, is_canceled)
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
             shade_args = snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled
             shaded = shade(*shade_args, preview_shader(self.images))
