@@ -335,10 +335,11 @@ class BakedFixedViews:
             return lights, receivers
         lights, baked = self.refined.of_highlights(light.environment.unlinked)
         lights = displayed_of(lights, light)
-        power = lights.irradiance.sum(axis=1)
-        brightest = np.sort(np.argsort(-power, kind="stable")[:max_lights])
-        visible = select_visibility(receivers.visible, np.arange(receivers.points.num_points), baked[brightest])
-        return lights.select(brightest, lights.irradiance[brightest]), replace(receivers, visible=visible)
+        if max_lights is not None:
+            brightest = np.sort(np.argsort(-lights.irradiance.sum(axis=1), kind="stable")[:max_lights])
+            lights, baked = lights.select(brightest, lights.irradiance[brightest]), baked[brightest]
+        visible = select_visibility(receivers.visible, np.arange(receivers.points.num_points), baked)
+        return lights, replace(receivers, visible=visible)
 
     def _linked(self, receivers: ShadingPoints, light: Illumination) -> ShadingPoints:
         """Return receivers whose visibility is zero where the environment does not light the surface."""
