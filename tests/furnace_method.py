@@ -22,8 +22,8 @@ from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import EditAxis, LightQuality, LightsAndPoints, Samples
 from relume.live.opened.fixed_views import BakedFixedViews
 from relume.live.opened.samples import SelectedSamples
-from relume.methods.store_layout import SHARD_ROWS
-from relume.methods.view_stages import CHUNK_ROWS, SampledViews
+from relume.methods.store_layout import array_of_rows
+from relume.methods.view_stages import SampledViews
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.patches.patches import choose_patches
@@ -112,7 +112,7 @@ class FurnaceMethod:
         if stage < _HITS:
             return self._views.arrays(stage, scene, recipe, store)
         return [
-            ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
+            array_of_rows(f"views/{k}/{name}", (rows, *width), dtype)
             for k, rows in enumerate(self._views.view_stage(store).num_surface_samples)
             for name, width, dtype in (("gather_hits", (RAYS,), "uint16"), ("seed", (), "uint32"))
         ]

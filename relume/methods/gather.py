@@ -30,8 +30,8 @@ from relume.methods import plan_estimates
 from relume.methods.mirror_lights import make_mirror_lights, max_mirror_lights, read_mirror_lights
 from relume.methods.patch_layout import read_patch_points, read_tree
 from relume.methods.read_cache import ReadCache
-from relume.methods.store_layout import SHARD_ROWS
-from relume.methods.view_stages import CHUNK_ROWS, SampledViews
+from relume.methods.store_layout import SHARD_ROWS, array_of_rows
+from relume.methods.view_stages import SampledViews
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import MAX_PATCHES
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches
@@ -148,14 +148,13 @@ class GatherMethod:
             ("patches/gather_hits", POINTS_PER_PATCH * RAYS_PER_POINT, "uint16"),
         ]
         patch_specs = [
-            ArraySpec(path, (num_patches, width), dtype, (CHUNK_ROWS, width), (PATCHES_PER_SHARD, width))
-            for path, width, dtype in widths
+            array_of_rows(path, (num_patches, width), dtype, PATCHES_PER_SHARD) for path, width, dtype in widths
         ]
         sample_columns = [("gather_hits", (self._ray_counts(recipe)[0],), "uint16"), ("seed", (), "uint32")]
         if mirror_lights is not None:
             sample_columns.append(("mirror_lights", (-(-mirror_lights.num_mirrored_lights // 8),), "uint8"))
         view_specs = [
-            ArraySpec(f"views/{k}/{name}", (rows, *width), dtype, (CHUNK_ROWS, *width), (SHARD_ROWS, *width))
+            array_of_rows(f"views/{k}/{name}", (rows, *width), dtype)
             for k, rows in enumerate(self._views.view_stage(store).num_surface_samples)
             for name, width, dtype in sample_columns
         ]

@@ -34,8 +34,8 @@ from relume.methods.mirror_lights import make_mirror_lights
 from relume.methods.patch_layout import read_patch_points, read_tree
 from relume.methods.read_cache import ReadCache
 from relume.methods.spherical_harmonic_transfer import harmonic_bytes, make_harmonic_light
-from relume.methods.store_layout import FREE_CAMERA_ERROR
-from relume.methods.view_stages import CHUNK_ROWS, SampledViews, light_arrays, read_targets, triangle_arrays
+from relume.methods.store_layout import FREE_CAMERA_ERROR, array_of_rows
+from relume.methods.view_stages import SampledViews, light_arrays, read_targets, triangle_arrays
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches
 from relume.probes.density import density_from_distance, density_from_shadows
@@ -149,13 +149,7 @@ class ProbesMethod:
             "probes": (bits, _num_rays(recipe)),
         }
         return [
-            ArraySpec(
-                f"{group}/{name}",
-                (store.shape(f"{group}/material")[0], width),
-                dtype,
-                (CHUNK_ROWS, width),
-                (ROWS_PER_SHARD, width),
-            )
+            array_of_rows(f"{group}/{name}", (store.shape(f"{group}/material")[0], width), dtype, ROWS_PER_SHARD)
             for group, group_widths in widths.items()
             for name, width, dtype in zip(("visibility", "gather_hits"), group_widths, ("uint8", "uint16"), strict=True)
         ]

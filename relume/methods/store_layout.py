@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +18,25 @@ from relume.raytrace.alpha_filter import AlphaTest
 from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks
 from relume.raytrace.visibility_masks import RayCounts
 from relume.scene.light_members import LightMembers
-from relume.store.bake_protocol import StoreReader
+from relume.store.bake_protocol import ArraySpec, StoreReader
 
 F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
+_CHUNK_BYTES, _MIN_CHUNK_ROWS = 1 << 20, 1024
 FREE_CAMERA_ERROR = "error/free_camera"
+
+
+def array_of_rows(path: str, shape: tuple[int, ...], dtype: str, shard_rows: int = SHARD_ROWS) -> ArraySpec:
+    """Return an array that tasks write by shards, in chunks of about a mebibyte: small ones are slow to read.
+
+    Args:
+        path: in the store. shape: of the array, rows first. dtype: name. shard_rows: of a shard, a power of two.
+    """
+    row_bytes = math.prod(shape[1:]) * np.dtype(dtype).itemsize
+    fitting_rows = 1 << max(_CHUNK_BYTES // max(row_bytes, 1), 1).bit_length() - 1
+    chunk_rows = min(max(fitting_rows, _MIN_CHUNK_ROWS), shard_rows)
+    return ArraySpec(path, shape, dtype, (chunk_rows, *shape[1:]), (shard_rows, *shape[1:]))
 
 
 def read_lights(store: StoreReader) -> TriangleLights:

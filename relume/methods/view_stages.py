@@ -45,7 +45,13 @@ from relume.lights.spherical_triangles import EnvironmentTexels, integrate_envir
 from relume.lights.tile_subdivision import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.methods import plan_estimates
 from relume.methods.read_cache import ReadCache
-from relume.methods.store_layout import SHARD_ROWS, light_members_path, read_lights, read_shadow_ray_directions
+from relume.methods.store_layout import (
+    SHARD_ROWS,
+    array_of_rows,
+    light_members_path,
+    read_lights,
+    read_shadow_ray_directions,
+)
 from relume.raytrace.scene_buffers import SceneBuffers, build_scene_buffers
 from relume.raytrace.visibility_masks import LightTargets, make_light_targets, trace_visibility_masks
 from relume.scene.emission import has_emission_images, relative_emission
@@ -54,7 +60,6 @@ from relume.scene.roughness_levels import levels_of_material, min_mean_normal_le
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 from relume.views.store_io import read_alpha_samples
 
-CHUNK_ROWS = 1024
 MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _EMISSION_BYTES, _NORMAL_MAP_BYTES, _ORIGIN_BYTES = 12, 4 + 12, 12
@@ -178,13 +183,7 @@ class SampledViews:
         bits = (store.shape("lights/irradiance")[0] + 7) // 8
         num_surface_samples = self.view_stage(store).num_surface_samples
         return [
-            ArraySpec(
-                f"views/{k}/visibility",
-                (num_surface_samples[k], bits),
-                "uint8",
-                (CHUNK_ROWS, bits),
-                (SHARD_ROWS, bits),
-            )
+            array_of_rows(f"views/{k}/visibility", (num_surface_samples[k], bits), "uint8")
             for k in range(len(recipe.views))
         ]
 

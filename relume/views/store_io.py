@@ -19,6 +19,8 @@ from relume.store.bake_protocol import StoreReader
 
 F32 = NDArray[np.float32]
 
+_ROWS_PER_BLOCK = 8192
+
 
 @runtime_checkable
 class TransferReader(Protocol):
@@ -56,6 +58,23 @@ def make_material_pattern(store: StoreReader, k: int, material: int) -> RayPatte
     """Recreate the pattern of the gather rays of a material's samples in the k-th view of a store."""
     num_cosine, num_glossy = store.attributes["gather_rays"][material]
     return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
+
+
+def read_rows_by_block(
+    store: StoreReader, path: str, rows: Shaped[NDArray[np.integer], " k"]
+) -> Shaped[NDArray[Any], "k ..."]:
+    """Read some rows of an array that need not fit into memory: a block of adjacent rows at a time.
+
+    Args:
+        store: an open store. path: of the array. rows: ascending.
+    """
+    num_rows = store.shape(path)[0]
+    blocks, first = np.unique(rows // _ROWS_PER_BLOCK, return_index=True)
+    parts = [store.read(path, 0, 0)]
+    for block, some in zip(blocks.tolist(), np.split(rows, first)[1:], strict=True):
+        start = block * _ROWS_PER_BLOCK
+        parts.append(store.read(path, start, min(start + _ROWS_PER_BLOCK, num_rows))[some - start])
+    return np.concatenate(parts)
 
 
 def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> Shaped[NDArray[np.uint32], " n"]:

@@ -38,6 +38,7 @@ from relume.views.store_io import (
     read_level_pairs,
     read_ray_origins,
     read_roughness_levels,
+    read_rows_by_block,
     read_seeds,
     read_shortest_normals,
     read_surface_points,
@@ -228,7 +229,10 @@ class View:
         def read() -> NDArray[np.uint8]:
             return self.store.read(f"views/{self.index}/visibility", rows.start, rows.stop)
 
-        return self.cache.transient.get_value((self.key, "visibility", *self.sample_key(material)), read)
+        return self.cache.transient.get_value(self._visibility_key(material), read)
+
+    def _visibility_key(self, material: int) -> tuple[Hashable, ...]:
+        return self.key, "visibility", *self.sample_key(material)
 
     def read_rows(
         self, name: str, material: int, sample_indices: Shaped[NDArray[np.integer], " k"]
@@ -236,14 +240,15 @@ class View:
         """Read an array of the view at some of a material's samples; if rays must be traced, only for those.
 
         Args:
-            name: name of the array. material: its index. sample_indices: counted from the material's first.
+            name: name of the array. material: its index.
+            sample_indices: ascending, counted from the material's first.
         """
         rows, path = self.rows(material), f"views/{self.index}/{name}"
         if isinstance(self.store, TransferReader):
             return np.asarray(self.store.read_rows(path, rows.start + sample_indices))
-        if name == "visibility":
+        if name == "visibility" and self.cache.contains(self._visibility_key(material)):
             return np.asarray(self._read_visibility(material)[sample_indices])
-        return np.asarray(self.store.read(path, rows.start, rows.stop)[sample_indices])
+        return read_rows_by_block(self.store, path, rows.start + sample_indices)
 
     def subset_rays(self, material: int, sample_indices: Shaped[NDArray[np.integer], " k"]) -> GatherRays:
         """Read gather rays of some of a material's samples, unfiltered and without light. See `read_rows`."""
