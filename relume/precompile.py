@@ -82,10 +82,15 @@ def precompile() -> None:
         raise ChildProcessError(f"compiling the kernels of fixed cameras ended with status {pictures.exitcode}")
 
 
-def _collect_rarely() -> None:
-    """Let this process collect garbage rarely: with Python's thresholds it takes a tenth of the time of compiling."""
+@contextmanager
+def _rare_collections() -> Iterator[None]:
+    """Collect garbage rarely: with Python's thresholds it takes a tenth of the time of compiling."""
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+    try:
+        yield
+    finally:
+        gc.unfreeze()  # else libraries report what is left at the end of the process as leaks
 
 
 def _compile_pictures(has_shared: Event) -> None:
@@ -94,8 +99,7 @@ def _compile_pictures(has_shared: Event) -> None:
     Args:
         has_shared: set when the kernels exist that other methods use as well.
     """
-    _collect_rarely()
-    with _temporary_scene() as (scene, folder):
+    with _rare_collections(), _temporary_scene() as (scene, folder):
         try:
             transfer = _bake_and_open(METHODS["direct"], scene, folder)
             _polish(transfer, _picture(transfer))
@@ -111,8 +115,7 @@ def _compile_pictures(has_shared: Event) -> None:
 
 def _compile_rays(has_shared: Event) -> None:
     """Compile the kernels of free cameras and gather rays, less those that `direct` uses: see `_compile_pictures`."""
-    _collect_rarely()
-    with _temporary_scene() as (scene, folder):
+    with _rare_collections(), _temporary_scene() as (scene, folder):
         transfer = _bake_and_open(METHODS["probes"], scene, folder)
         _move_cameras(transfer, FreeCameraPicture(transfer, VIEW, is_watched=True))
         has_shared.wait()

@@ -67,6 +67,8 @@ def _usage(error: TyperException, arguments: Sequence[str]) -> str:
     text = error.format_message() or "no command given; see relume --help"
     if (missing_match := _MISSING.match(text)) is not None:
         return f"{missing_match['name']} is missing; see {_command(arguments)} --help"
+    if text.startswith("No such command"):
+        return f"{text.removesuffix('.')}; see relume --help"
     invalid = _INVALID.fullmatch(text)
     if invalid is None:
         return text

@@ -38,7 +38,7 @@ test("the label says that the timeline plays", () => {
     expect(labels()).toEqual(["Playing"]);
   }
   isPlaying.value = false;
-  expect(labels()).toEqual(["Approximate while dragging"]);
+  expect(labels()).toEqual(["Approximate"]);
 });
 
 test("a direct light bake is labeled even if its image is exact", () => {

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from relume.core.errors import ParameterError
+from relume.assets.environments.environment_names import load_environment
+from relume.core.errors import NotFoundError, ParameterError, SceneError
 from relume.core.import_warnings import quote
 from relume.export.export_images import ExportImages
 from relume.export.export_materials import ExportMaterial, MaterialExporter
@@ -57,6 +58,15 @@ class ExportDocument:
                 replacements.setdefault(numbers[id(materials[index])], []).append(variant)
         return replacements
 
+    @property
+    def environment_name(self) -> str:
+        """Name of the environment of the look, as users know it; as looks do if it is unavailable."""
+        name = self.look.environment.map
+        try:
+            return self.scene.environment.name if name is None else load_environment(name).name
+        except (NotFoundError, SceneError):
+            return str(name)
+
     def lights(self) -> Iterator[tuple[str, SingleLightLook]]:
         """Lights other than emissive materials; area lights only if they emit."""
         for name, light in single_lights(self.scene, self.look).items():
@@ -70,17 +80,19 @@ def prepare_export(
     """Convert a scene's materials, without writing anything.
 
     Args:
-        scene: the scene. look: a complete look of it. variants: further complete looks of it by name.
+        scene: the scene. look: a complete look of it.
+        variants: further complete looks of it by name, after the variants that it was imported with.
         has_materials: the file has materials; otherwise none are converted.
     Raises:
         ParameterError: there are too many variants. NotFoundError, SceneError: an image of a look is unavailable.
     """
-    variants = variants or {}
-    if len(variants) > MAX_VARIANTS:
-        raise ParameterError("variants", len(variants), f"at most {MAX_VARIANTS} looks")
-    images = ExportImages()
+    variants, images = variants or {}, ExportImages()
     if not has_materials:
         return ExportDocument(scene, look, [], {name: [] for name in variants}, images)
+    own = {name: look_of_scene(scene, partial, f"variant {name!r}") for name, partial in scene.variants.items()}
+    variants = {**own, **variants}
+    if len(variants) > MAX_VARIANTS:
+        raise ParameterError("variants", len(variants), f"at most {MAX_VARIANTS} looks, with the variants of the scene")
     scene, (look, *others) = assign_in_all_looks(scene, [look, *variants.values()])
     exporter = MaterialExporter(scene, images)
     by_variant = {name: exporter.materials(each) for name, each in zip(variants, others, strict=True)}

@@ -42,11 +42,10 @@ _UP = np.array([[0, 1, 0]], np.float32)
 
 def omitted_from_glb(export: ExportDocument) -> tuple[str, ...]:
     """Sentences about what a GLB file does not have."""
-    environment = export.look.environment.map or export.scene.environment.name
     has_profile = any(getattr(light, "profile", None) for _, light in export.lights())
     is_linked = any(light.link or light.shadow_link for _, light in export.lights())
     return (
-        f"The environment {environment} is not part of the file.",
+        f"The environment {export.environment_name} is not part of the file.",
         *(["IES files of lights are not exported."] if has_profile else []),
         *(["Lights light all objects in the file, and all cast shadows: glTF has no links."] if is_linked else []),
     )

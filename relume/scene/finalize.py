@@ -58,8 +58,11 @@ def no_triangles(warnings: Sequence[ImporterWarning], contents: str) -> str:
     Args:
         warnings: of the import. contents: of a file without faults, as a clause.
     """
-    faults = "; ".join(dict.fromkeys(str(warning) for warning in warnings if warning.severity == "unsupported"))
-    message = "the scene has no triangles with an area; export at least one mesh made of triangles"
-    message += f" ({faults or contents})"
-    message = "".join(character if character.isprintable() else " " for character in message)
-    return message if len(message) <= MAX_REFUSAL else f"{message[: MAX_REFUSAL - 1]}…"
+    unsupported = (str(warning) for warning in warnings if warning.severity == "unsupported")
+    faults = [fault.rstrip(".") for fault in dict.fromkeys(unsupported)] or [contents]
+    message, left = "the scene has no triangles with an area; export at least one mesh made of triangles", 0
+    while faults and len(message) + len("; ".join(faults)) > MAX_REFUSAL:  # whole sentences, as many as fit
+        faults, left = faults[:-1], left + 1
+    more = [f"and {left} more" if faults else "nothing in it is supported"] if left else []
+    message += f" ({'; '.join([*faults, *more])})"
+    return "".join(character if character.isprintable() else " " for character in message)

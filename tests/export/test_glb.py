@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -194,6 +195,18 @@ def test_saved_looks_are_variants_of_the_materials_that_differ(tmp_path: Path) -
     assert [*again.variants["Red \U0001f534"]["materials"]] == ["Wall"]
     assert again.variants["Red \U0001f534"]["materials"]["Wall"]["terms"][0]["color"] == pytest.approx([0.8, 0.1, 0.1])
     assert again.variants['a-b "c"']["materials"] == {}
+
+
+def test_variants_of_the_file_come_back_unless_a_look_has_their_name(tmp_path: Path) -> None:
+    scene = scene_of(Material("Wall", terms_of(PLASTIC)), Material("Ball", terms_of(METAL)))
+    red, blue, green = (
+        {"materials": {"Wall": {"terms": [{"model": "lambert", "color": color}]}}}
+        for color in ([0.8, 0.1, 0.1], [0.1, 0.1, 0.8], [0.1, 0.8, 0.1])
+    )
+    written(tmp_path / "a.glb", replace(scene, variants={"Red": red, "Blue": blue}), None, Blue=green)
+    again = import_scene(tmp_path / "a.glb", "again")
+    colors = {name: look["materials"]["Wall"]["terms"][0]["color"] for name, look in again.variants.items()}
+    assert colors == {"Red": pytest.approx([0.8, 0.1, 0.1]), "Blue": pytest.approx([0.1, 0.8, 0.1])}
 
 
 def test_metal_and_dielectric_are_blended_per_texel(tmp_path: Path) -> None:

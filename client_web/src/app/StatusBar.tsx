@@ -54,7 +54,9 @@ export function StatusBar() {
       <span class="latency" title="From input to the drawn frame">
         Latency {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
-      <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText.value}</span>
+      <span class={`exactness ${isConverged.value ? "is-exact" : ""}`} title={imageStatusText.value}>
+        {imageStatusText.value}
+      </span>
       <button
         aria-pressed={shownPanels.value.includes("comparison")}
         title="Measure this picture’s error against path tracing"

@@ -84,7 +84,7 @@ function RelightableCheckbox({ isRelightable, onChoose }: RelightableCheckboxPro
     <label class="bake-relightable">
       <input type="checkbox" checked={isRelightable} onChange={() => onChoose(!isRelightable)} />
       Optimize for swapping HDRIs
-      <small>more accurate when you rotate or replace the environment, slightly coarser in this one</small>
+      <small>Bounce light and moving cameras follow another environment better, and this one slightly less well.</small>
     </label>
   );
 }

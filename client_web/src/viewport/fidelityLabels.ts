@@ -17,13 +17,13 @@ export interface FidelityMark {
 const MARKS: Record<Exclude<Fidelity, "exact">, FidelityMark> = {
   preview: { label: "Preview", title: "Rendered from a subset of pixels; the full picture follows." },
   approximate: { label: "Updating…", title: "Showing the previous picture while the new one renders." },
-  incremental: { label: "Approximate while dragging", title: "Exact when you let go." },
-  near_exact: { label: "Almost final", title: "Exact when you let go." },
+  incremental: { label: "Approximate", title: "This frame follows your edit. The exact picture comes when you let go." },
+  near_exact: { label: "Almost final", title: "Remaining differences are too small to see. The exact picture follows." },
 };
 const OTHER_LIGHT_MARK: FidelityMark = {
   label: "Baked for a different environment",
   title:
-    "This environment was added after baking, so shadows of small light sources are approximate. Bake again to fix this.",
+    "This environment was chosen after baking, so bounce light and moving cameras show it more coarsely. Bake again to fix this.",
 };
 
 const DIRECT_ONLY_MARK: FidelityMark = {

@@ -34,7 +34,7 @@ def test_another_environment_is_chosen_by_click_and_by_key_and_undone(editor: Ed
     group.get_by_role("radio", name="Clear sky").click()
     clear = editor.pixels()
     assert changed(before, clear) > 0.5
-    expect(page.get_by_text("shadows of small light sources are approximate")).to_be_visible()
+    expect(page.get_by_text("bounce light shows it more coarsely")).to_be_visible()
     group.get_by_role("radio", name="Clear sky").press("ArrowRight")
     expect(group.get_by_role("radio", name="Sunset")).to_be_checked()
     expect(group.get_by_role("radio", name="Sunset")).to_be_focused()
@@ -42,7 +42,7 @@ def test_another_environment_is_chosen_by_click_and_by_key_and_undone(editor: Ed
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
     expect(group.get_by_role("radio", name="Original")).to_be_checked()
-    expect(page.get_by_text("shadows of small light sources are approximate")).to_have_count(0)
+    expect(page.get_by_text("bounce light shows it more coarsely")).to_have_count(0)
     assert changed(before, editor.pixels()) < 0.01
 
 

@@ -111,7 +111,7 @@ export function EnvironmentGallery() {
       <div class="environment-text" role="status">
         {importProgress.value}
         {map !== null && (
-          <p>This environment was added after baking, so shadows of small light sources are approximate.</p>
+          <p>This environment was chosen after baking, so bounce light shows it more coarsely. Bake again to fix this.</p>
         )}
       </div>
     </>
