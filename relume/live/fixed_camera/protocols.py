@@ -410,11 +410,13 @@ class FixedViewTransfer(OpenBake, Protocol):
         """
         ...
 
-    def few_lobe_rays(self, light: Illumination, is_canceled: Callable[[], bool]) -> LobeShader:
-        """Prepare images of narrow terms by few rays a sample; takes seconds.
+    def few_lobe_rays(
+        self, light: Illumination, is_canceled: Callable[[], bool], quality: LightQuality = LightQuality.EXACT
+    ) -> LobeShader:
+        """Prepare images of narrow terms by few rays a sample; takes seconds with exact light of patches.
 
         Args:
-            light: the illumination. is_canceled: polled.
+            light: the illumination. is_canceled: polled. quality: of the light of patches.
         Raises:
             CancelledError: `is_canceled` returned true.
         """

@@ -15,7 +15,7 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import CancelCheck
-from relume.live.fixed_camera.protocols import Samples
+from relume.live.fixed_camera.protocols import LightQuality, Samples
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
@@ -44,6 +44,14 @@ class LobeSource(EnvironmentSource, Protocol):
         """
         ...
 
+    def patch_light(self, light: Illumination, is_canceled: CancelCheck, quality: LightQuality) -> OutgoingLight:
+        """Return the outgoing light of patches.
+
+        Args:
+            light: the illumination. is_canceled: polled. quality: of the light.
+        """
+        ...
+
     def local_lobe_lights(self, light: Illumination) -> Sequence[LobeLight]:
         """Return the local lights as narrow lobes see them. light: the illumination"""
         ...
@@ -64,11 +72,13 @@ class FewLobeRays:
     environment: PrefilteredEnvironment
 
     @classmethod
-    def prepare(cls, light_transport: LobeSource, light: Illumination, is_canceled: CancelCheck) -> Self:
+    def prepare(
+        cls, light_transport: LobeSource, light: Illumination, is_canceled: CancelCheck, quality: LightQuality
+    ) -> Self:
         """Compute all that takes longer than a frame.
 
         Args:
-            light_transport: the bake. light: the illumination. is_canceled: polled.
+            light_transport: the bake. light: the illumination. is_canceled: polled. quality: of the light of patches.
         Raises:
             CancelledError: `is_canceled` returned true.
         """
@@ -76,7 +86,7 @@ class FewLobeRays:
         lookup, bright_lights = environments.environment_lookup(key.map), environments.bright_lights(key)
         gain = np.array(light.environment_gain, np.float32)
         environment = PrefilteredEnvironment(lookup, bright_lights, rotation_of(key.rotation), gain)
-        return cls(light_transport, light, light_transport.lobe_scene(light, is_canceled).outgoing, environment)
+        return cls(light_transport, light, light_transport.patch_light(light, is_canceled, quality), environment)
 
     def shade(
         self,

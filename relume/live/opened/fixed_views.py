@@ -386,7 +386,7 @@ class BakedFixedViews:
         pattern, images = self.lobe_tracer.pattern(lobe, quality), self._hit_images(light)
         narrow = narrow_surfaces(light.reflectances) if light.paths.has_all_bounces else ()
         key = digest((pattern.num_rays, *lobe.identity, narrow, images))
-        outgoing = None if patch_light is None else self._patch_light(patch_light, is_canceled)
+        outgoing = None if patch_light is None else self.patch_light(patch_light, is_canceled)
         footprint, scene = samples.pixel_footprint(receivers), self.lobe_scene(light, is_canceled, outgoing)
         hits = samples.lobe_hits(key, lambda: trace_lobes(scene, receivers, footprint, pattern, is_canceled))
         hits, environment, peaks = scene.links.lit_hits(hits, receivers.points), NO_ENVIRONMENT, NO_PEAKS
@@ -413,9 +413,11 @@ class BakedFixedViews:
         """The triangles with the normals of their corners, without tangents and textures; a store may lack them."""
         return with_normals(self.tracer.geometry, self.lobe_tracer.normals)
 
-    def few_lobe_rays(self, light: Illumination, is_canceled: Callable[[], bool]) -> FewLobeRays:
+    def few_lobe_rays(
+        self, light: Illumination, is_canceled: Callable[[], bool], quality: LightQuality = LightQuality.EXACT
+    ) -> FewLobeRays:
         """Prepare images of narrow terms by few rays a sample. See `FixedViewTransfer`."""
-        return FewLobeRays.prepare(self, light, is_canceled)
+        return FewLobeRays.prepare(self, light, is_canceled, quality)
 
     def local_lobe_lights(self, light: Illumination) -> Sequence[LobeLight]:
         """Return the local lights as narrow lobes see them. light: the illumination"""
@@ -436,7 +438,7 @@ class BakedFixedViews:
         """
         reflectances = light.reflectances
         goes_on = light.paths.has_all_bounces and bool(narrow_surfaces(reflectances))
-        patch_light = self._patch_light(light, is_canceled) if outgoing is None else outgoing
+        patch_light = self.patch_light(light, is_canceled) if outgoing is None else outgoing
         light_args = patch_light, material_emissions(light, self.material_names)
         surface_args = reflectances, self._hit_images(light), self._lobe_patches(reflectances)
         links = LightLinks(self.local.linked, light, self.material_names)
@@ -480,8 +482,14 @@ class BakedFixedViews:
         """Return the fraction of each patch's points that see some light triangles: there are no patches."""
         return np.zeros((NO_PATCH + 1, len(lights)), np.float32)
 
-    def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
-        """Return the outgoing light of patches: there are none."""
+    def patch_light(
+        self, light: Illumination, is_canceled: Callable[[], bool], quality: LightQuality = LightQuality.EXACT
+    ) -> OutgoingLight:
+        """Return the outgoing light of patches: there are none.
+
+        Args:
+            light: the illumination. is_canceled: polled. quality: of the light.
+        """
         return no_light()
 
     def _gather_rays(

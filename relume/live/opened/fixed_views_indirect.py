@@ -122,9 +122,15 @@ class BakedIndirectViews(BakedFixedViews):
         gather_rays = view.subset_rays(material, sample_indices)
         return replace(samples, stored_rays=gather_rays, mirror_visibility=mirror_visibility)
 
-    def _patch_light(self, light: Illumination, is_canceled: Callable[[], bool]) -> OutgoingLight:
-        """Return the exact outgoing light of patches."""
-        return self.indirect.outgoing_light(light, is_canceled=is_canceled) if light.paths.has_indirect else no_light()
+    def patch_light(
+        self, light: Illumination, is_canceled: Callable[[], bool], quality: LightQuality = LightQuality.EXACT
+    ) -> OutgoingLight:
+        """Return the outgoing light of patches.
+
+        Args:
+            light: the illumination. is_canceled: polled. quality: of the light.
+        """
+        return self.indirect.outgoing_light(light, quality, is_canceled) if light.paths.has_indirect else no_light()
 
     def _lobe_patches(self, reflectances: Reflectances) -> LobePatches:
         """Return the textures and reflectances of patches, for lobe rays."""

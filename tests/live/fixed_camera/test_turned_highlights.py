@@ -18,7 +18,7 @@ from relume.scene.model import Material
 from relume.store.bake_protocol import Recipe
 from relume.store.run_bake import bake_in_process
 
-GLOSSY = ({"model": "cook_torrance", "color": [1] * 3, "params": {"sigma": 0.06, "ior": 1.5}},)
+GLOSSY = ({"model": "cook_torrance", "color": [1] * 3, "params": {"sigma": 0.075, "ior": 1.5}},)
 TURNED = 160.0
 
 
@@ -39,13 +39,16 @@ def bake(tmp_path_factory):
     return open_transfer(path, Cache(1 << 30))
 
 
-def preview_error(bake, degrees):
+def preview_error(bake, degrees, terms=GLOSSY):
     """Error of the preview of a turned environment; each angle once, since exact pictures are kept."""
 
     def turned(document):
         document["environment"]["rotation"] = degrees
+        document["materials"]["Ball"] = {"terms": list(terms)}
 
-    picture = run_until_exact(Picture(bake, "front", Cache(BUDGET)))
+    picture = Picture(bake, "front", Cache(BUDGET))
+    picture.set_look(make_look(bake, lambda document: document["materials"].update(Ball={"terms": list(terms)})))
+    run_until_exact(picture)
     picture.set_look(make_look(bake, turned))
     picture.advance(None)
     assert kind_of(picture.next_job()) == "preview"
@@ -92,3 +95,15 @@ def test_the_brightest_lights_are_a_part_of_all(bake):
     power = np.sort(all_lights.irradiance.sum(axis=1))[::-1]
     np.testing.assert_allclose(np.sort(brightest.irradiance.sum(axis=1))[::-1], power[:20])
     assert points.visible.shape[1] == 3
+
+
+POLISHED = ({"model": "ggx", "color": [1] * 3, "params": {"roughness": 0.1, "f0": [0.9] * 3}},)
+
+
+def test_polished_surfaces_are_not_interpolated(bake, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 100)
+    traced = preview_error(bake, 200.0, POLISHED)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview.has_round_narrow_lobe", lambda live: False)
+    interpolated = preview_error(bake, 201.0, POLISHED)
+    assert traced < 0.15
+    assert traced < 0.6 * interpolated

@@ -48,11 +48,13 @@ class DenseTerms(NamedTuple):
 NO_DENSE_TERMS = DenseTerms()
 
 
-def find_dense_terms(images: ViewImages, targets: Sequence[TermTarget], light: Illumination) -> DenseTerms:
+def find_dense_terms(
+    images: ViewImages, targets: Sequence[TermTarget], light: Illumination, others: frozenset[int] = frozenset()
+) -> DenseTerms:
     """Return which terms are shaded at all samples, as far as time and memory allow.
 
     Args:
-        images, targets: the terms. light: the illumination.
+        images, targets: the terms. light: the illumination. others: indices of terms that are shown otherwise.
     """
     if not light.has_direct_environment or light.environment.link is not None:  # links darken a copy of all visibility
         return NO_DENSE_TERMS
@@ -63,7 +65,7 @@ def find_dense_terms(images: ViewImages, targets: Sequence[TermTarget], light: I
     diffuse = frozenset(k for k, target in enumerate(targets) if _is_diffuse(target))
     if sum(targets[k].material.num_samples for k in diffuse) * num_lights > _MAX_PAIRS:
         return NO_DENSE_TERMS
-    return DenseTerms(diffuse, _find_glossy(images, targets, diffuse))
+    return DenseTerms(diffuse, _find_glossy(images, targets, diffuse | others))
 
 
 def preview_shader(images: ViewImages) -> type[UndividedShader] | None:
@@ -79,11 +81,11 @@ def _is_diffuse(target: TermTarget) -> bool:
     return term.is_lambertian and all(is_constant(term, each) for each in contract_levels(term, bands, None))
 
 
-def _find_glossy(images: ViewImages, targets: Sequence[TermTarget], diffuse: frozenset[int]) -> frozenset[int]:
-    """Return the terms of the materials that bend most, until their samples take too long."""
-    others = [k for k, target in enumerate(targets) if k not in diffuse and target.live.term.texels is None]
+def _find_glossy(images: ViewImages, targets: Sequence[TermTarget], others: frozenset[int]) -> frozenset[int]:
+    """Return the terms of the materials that bend most, less some others, until their samples take too long."""
+    possible = [k for k, target in enumerate(targets) if k not in others and target.live.term.texels is None]
     bend, glossy, num_left = block_sizes(images.view, 1), set[int](), _MAX_GLOSSY
-    for k in sorted(others, key=lambda k: bend[targets[k].material.index]):
+    for k in sorted(possible, key=lambda k: bend[targets[k].material.index]):
         if targets[k].material.num_samples <= num_left:
             glossy.add(k)
             num_left -= targets[k].material.num_samples

@@ -11,8 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Shaped
-from numpy.typing import NDArray
 
 from relume.brdf.albedo import max_albedo_change
 from relume.brdf.lobe_sampling import lobe_curves
@@ -22,6 +20,7 @@ from relume.live.fixed_camera.illumination import Illumination, equal_up_to_refl
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.fixed_camera.protocols import LightQuality, LobeShader
 from relume.live.fixed_camera.strategies import operator
+from relume.live.fixed_camera.strategies.lobe_image import has_round_narrow_lobe, lobe_image
 from relume.live.fixed_camera.strategies.shading import average_split
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget
@@ -61,7 +60,7 @@ def _update(target: TermTarget, light: Illumination, max_coefficients: int | Non
     assert reference is not None
     state = replace(live.ready, fidelity=Fidelity.APPROXIMATE, light=light)
     if (shader := _lobe_shader(target, reference)) is not None:
-        image = _trace_lobe(target, light, shader)
+        image = lobe_image(target, light, shader, live.document, live.view_factor)
         live.set_ready(replace(state, image=image, bands=live.target_bands, traces_lobe=True))
         return
     if live.keeps_showing(reference):
@@ -78,24 +77,10 @@ def _lobe_shader(target: TermTarget, reference: DisplayedImage) -> LobeShader | 
     """Return what shows a term by few rays along its narrow lobe; None if an operator shows it without noise."""
     live, shader = target.live, target.images.lobe_shader
     shapes_lobe = {curve.name for curve in lobe_curves(live.document)}
-    if shader is None or shader.light != reference.light or live.levels.pairs:
+    if shader is None or shader.light != reference.light or not has_round_narrow_lobe(live):
         return None
     is_shaped = not shapes_lobe.isdisjoint(reference.changed_curves(live.target_bands))
-    return shader if is_shaped and live.lobe is not None and live.lobe.is_round else None
-
-
-def _trace_lobe(
-    target: TermTarget, light: Illumination, shader: LobeShader
-) -> Shaped[NDArray[np.float32], "tiles 3 samples"]:
-    """Return the image of a narrow term by few rays a sample."""
-    images, material, live = target
-    samples = images.transfer.samples(images.view, material.index, images.cache)
-    sample_args = samples, images.unlit_samples(material), images.view, material.index
-    rows = shader.shade(*sample_args, light, live.document)
-    assert rows is not None  # its lobe is narrow
-    if live.view_factor is not None:
-        rows /= np.maximum(live.view_factor.T, np.float32(1e-6))
-    return ShadedTerm.from_rows(rows).image
+    return shader if is_shaped else None
 
 
 def _preparation_job(situation: Situation) -> Job | None:

@@ -38,6 +38,7 @@ from relume.live.fixed_camera.strategies.dense_light import (
     preview_shader,
     shade_dense,
 )
+from relume.live.fixed_camera.strategies.lobe_image import has_round_narrow_lobe, lobe_image
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look.model import Rgb
@@ -155,6 +156,14 @@ class _TermSnapshot:
     target: TermTarget
     term: Term
     bands: Mapping[str, NDArray[np.float64]]
+    document: Mapping[str, Any]
+    view_factor: Shaped[F32, "channels n"] | None
+
+    @classmethod
+    def of_target(cls, target: TermTarget) -> _TermSnapshot:
+        """Return the state of a term now."""
+        live = target.live
+        return cls(target, live.term, live.target_bands, live.document, live.view_factor)
 
 
 @dataclass(frozen=True)
@@ -164,6 +173,7 @@ class SparsePreview:
     Attributes:
         gain: gain of the finished image in that light.
         detail: number of refinements. dense_terms: indices of the terms that are also shaded at all samples.
+        lobe_terms: indices of the terms that lobe rays show at all samples: interpolated, they would be blocks.
     """
 
     images: ViewImages
@@ -172,6 +182,7 @@ class SparsePreview:
     snapshots: Sequence[_TermSnapshot]
     detail: int = 0
     dense_terms: DenseTerms = NO_DENSE_TERMS
+    lobe_terms: frozenset[int] = frozenset()
 
     @classmethod
     def for_targets(
@@ -189,9 +200,14 @@ class SparsePreview:
             images, targets: the terms. light: the illumination. detail: number of refinements.
             is_read: samples of the view have been read already; else a dense preview takes longer.
         """
-        snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
-        dense_terms = find_dense_terms(images, targets, light) if is_read else NO_DENSE_TERMS
-        return cls(images, light, images.gain, snapshots, detail, dense_terms)
+        snapshots = list(map(_TermSnapshot.of_target, targets))
+        if not is_read:
+            return cls(images, light, images.gain, snapshots, detail)
+        is_linked = light.environment.link is not None  # lobe rays do not know links
+        narrow = (k for k, target in enumerate(targets) if has_round_narrow_lobe(target.live) and not is_linked)
+        lobe_terms = frozenset(narrow)
+        dense_terms = find_dense_terms(images, targets, light, lobe_terms)
+        return cls(images, light, images.gain, snapshots, detail, dense_terms, lobe_terms)
 
     def job(
         self, label: str, on_preview: Callable[[Illumination, Rgb], None], priority: Priority = Priority.IMAGE
@@ -214,11 +230,16 @@ class SparsePreview:
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> list[F32]:
         """Return the images of all terms, (tiles, 3, samples) float32 each."""
-        previews = []
+        previews, shader = [], None
+        if self.lobe_terms:
+            shader = self.images.transfer.few_lobe_rays(self.light, is_canceled, LightQuality.PREVIEW)
         for k, snapshot in enumerate(self.snapshots):
             subset = _sample_subset(self.images, snapshot.target.material.index, self.light, self.detail)
             dense = self._dense_image(k, is_canceled)
-            if dense is not None and k in self.dense_terms.diffuse and is_dense_alone(self.light):
+            if shader is not None and k in self.lobe_terms:
+                term_args = snapshot.target, self.light, shader, snapshot.document, snapshot.view_factor
+                previews.append(lobe_image(*term_args))
+            elif dense is not None and k in self.dense_terms.diffuse and is_dense_alone(self.light):
                 previews.append(dense.image)
             else:
                 previews.append(self._preview_image(snapshot, subset, dense, is_canceled))
