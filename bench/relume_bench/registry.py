@@ -77,7 +77,7 @@ GROUPS = (
             "opening.larger_ratio",
         ),
     ),
-    Group("relume_bench.turning", ("turning.fps", "turning.error")),
+    Group("relume_bench.turning", ("turning.fps", "turning.error", "turning.polished_error")),
     Group("relume_bench.slider_drag", ("slider.drag_error", "slider.frame_ms", "slider.freeze_ratio")),
     Group("relume_bench.large", ("large.frame_ms", "large.frame_ratio", "large.bytes_ratio")),
     Group("relume_bench.sharp_slider", ("slider.sharp_error", "slider.sharp_levels")),

@@ -217,6 +217,7 @@ PEERS = {
     "load.drag_with_renders_ratio": "1, no renders",
     "memory.": "323 MB, server at start",
     "turning.error": "the exact picture",
+    "turning.polished_error": "the exact picture",
     "lens.": "Mitsuba 3",
     "mirror.": "Mitsuba 3",
     "opening.larger_ratio": "1, ratio of pixels",
