@@ -17,8 +17,14 @@ export interface FidelityMark {
 const MARKS: Record<Exclude<Fidelity, "exact">, FidelityMark> = {
   preview: { label: "Preview", title: "Rendered from a subset of pixels; the full picture follows." },
   approximate: { label: "Updating…", title: "Showing the previous picture while the new one renders." },
-  incremental: { label: "Approximate", title: "This frame follows your edit. The exact picture comes when you let go." },
-  near_exact: { label: "Almost final", title: "Remaining differences are too small to see. The exact picture follows." },
+  incremental: {
+    label: "Approximate",
+    title: "This frame follows your edit. The exact picture comes when you let go.",
+  },
+  near_exact: {
+    label: "Almost final",
+    title: "Remaining differences are too small to see. The exact picture follows.",
+  },
 };
 const OTHER_LIGHT_MARK: FidelityMark = {
   label: "Baked for a different environment",

@@ -111,7 +111,9 @@ export function EnvironmentGallery() {
       <div class="environment-text" role="status">
         {importProgress.value}
         {map !== null && (
-          <p>This environment was chosen after baking, so bounce light shows it more coarsely. Bake again to fix this.</p>
+          <p>
+            This environment was chosen after baking, so bounce light shows it more coarsely. Bake again to fix this.
+          </p>
         )}
       </div>
     </>
