@@ -389,7 +389,7 @@ def test_a_file_without_faults_says_why_nothing_is_shown() -> None:
     flat.quad()
     flat.document["nodes"][0]["scale"] = [1, 0, 0]
     cases = {"the file has no meshes": no_meshes, "no node of the scene shows a mesh": no_node}
-    flat_fault = "Skipped mesh “quad”: its scale is zero or it is too large."
+    flat_fault = "Skipped mesh “quad”: its scale is zero or it is too large"
     for contents, glb in (*cases.items(), (flat_fault, flat)):
         with pytest.raises(SceneError, match=re.escape(f"made of triangles ({contents})")):
             import_gltf(glb.bytes(), "test", LIGHT)
