@@ -56,7 +56,7 @@ from relume.live.opened.lobe_light import (
 from relume.live.opened.local_lights import LocalLights
 from relume.live.opened.object_material_store import ObjectMaterialStore
 from relume.live.opened.own_images import OwnImages
-from relume.live.opened.refined_environments import PREVIEW_WIDTH, RefinedEnvironments
+from relume.live.opened.refined_environments import RefinedEnvironments
 from relume.live.opened.retrace import NormalRetracer
 from relume.live.opened.samples import MaterialSamples, SelectedSamples
 from relume.live.opened.split_samples import split_light
@@ -80,6 +80,7 @@ from relume.views.frost_filter import GLOW_WIDTH, MAX_FROSTED_RATIO, RAY_SPACING
 from relume.views.split_pixels import with_normals
 from relume.views.view import View, open_view
 
+PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
@@ -241,16 +242,26 @@ class BakedFixedViews:
         Args:
             label: name of the part. environment: with that part. find_radiance: returns the part by environment name.
         """
-        key = self.cache_owner(environment.map), f"texels of preview {label}", environment.map
 
         def integrate() -> TriangleLights:
-            rotatable = self.cache.get_value(
-                key,
-                lambda: EnvironmentTexels.from_radiance(halve_to_width(find_radiance(environment.map), PREVIEW_WIDTH)),
-            )
+            rotatable = self._coarse_texels(label, environment.map, find_radiance)
             return integrate_environment(self.tiles, rotatable, environment.rotation)
 
         return self.cache.transient.get_value((self.key, f"preview {label}", environment), integrate)
+
+    def coarse_texels(self, name: str | None) -> EnvironmentTexels:
+        """Return the texels of a small map of an environment, before any rotation; see `environment_radiance`."""
+        return self._coarse_texels("lights", name, self.environment_radiance)
+
+    def _coarse_texels(
+        self, label: str, name: str | None, find_radiance: Callable[[str | None], F32]
+    ) -> EnvironmentTexels:
+        """Return the same of a part of an environment, cached: rotation does not change them."""
+
+        def read() -> EnvironmentTexels:
+            return EnvironmentTexels.from_radiance(halve_to_width(find_radiance(name), PREVIEW_WIDTH))
+
+        return self.cache.get_value((self.cache_owner(name), f"texels of preview {label}", name), read)
 
     def cache_owner(self, name: str | None) -> str:
         """Return the owner of cache entries of an environment: the bake, if it is the scene's own."""

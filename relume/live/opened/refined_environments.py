@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets.environments.equirect import halve_to_width
 from relume.core.cache import Cache
 from relume.lights.refined_environment import RefinedEnvironment, environment_metric, misses_light, refine_environment
 from relume.lights.sphere_tiles import Tiles
@@ -23,9 +22,6 @@ from relume.raytrace.new_tiles import NewTiles
 from relume.store.bake_protocol import StoreReader
 
 F32 = NDArray[np.float32]
-
-PREVIEW_WIDTH = 256
-"""Texels across the map of an environment in previews."""
 
 _NUM_STRONG, _STRONG = 4, 0.02  # tiles whose shadows a preview traces, with this part of all light
 _PREVIEW_METRIC = 32  # times that of exact images: fewer tiles, which the brightest lights of a preview are
@@ -66,6 +62,10 @@ class TiledBake(Protocol):
 
     def environment_radiance(self, name: str | None) -> Shaped[F32, "height width 3"]:
         """Return the radiance of an environment, None for the scene's own."""
+        ...
+
+    def coarse_texels(self, name: str | None) -> EnvironmentTexels:
+        """Return the texels of a small map of an environment, before any rotation."""
         ...
 
     def environment_lights(self, environment: EnvironmentKey, quality: LightQuality) -> TriangleLights:
@@ -133,20 +133,16 @@ class RefinedEnvironments:
         Raises:
             NotFoundError: the environment does not exist here. SceneError: its files are damaged.
         """
-        bake, cache = self._bake, self._bake.cache.transient
+        bake = self._bake
         if self._is_as_baked(environment):
             return LightsOfHighlights(bake.lights, np.arange(bake.lights.num_lights))
 
-        def read() -> EnvironmentTexels:
-            radiance = bake.environment_radiance(environment.map)
-            return EnvironmentTexels.from_radiance(halve_to_width(radiance, PREVIEW_WIDTH))
-
         def refine() -> LightsOfHighlights:
-            texels = cache.get_value((bake.key, "texels of highlights", environment.map), read)
-            lights = self._refine(texels, environment.rotation, _PREVIEW_METRIC * self._metric).lights
+            texels, metric = bake.coarse_texels(environment.map), _PREVIEW_METRIC * self._metric
+            lights = self._refine(texels, environment.rotation, metric).lights
             return LightsOfHighlights(lights, bake.tiles.locate(lights.direction.astype(np.float64)).astype(np.intp))
 
-        return cache.get_value((bake.key, "lights of highlights", environment), refine)
+        return bake.cache.transient.get_value((bake.key, "lights of highlights", environment), refine)
 
     def _refine(self, texels: EnvironmentTexels, rotation: float, metric: float) -> RefinedEnvironment:
         return refine_environment(self._bake.tiles, self._bake.shadow_ray_directions, texels, rotation, metric)

@@ -204,8 +204,8 @@ class SparsePreview:
         if not is_read:
             return cls(images, light, images.gain, snapshots, detail)
         is_linked = light.environment.link is not None  # lobe rays do not know links
-        narrow = (k for k, target in enumerate(targets) if has_round_narrow_lobe(target.live) and not is_linked)
-        lobe_terms = frozenset(narrow)
+        narrow = [k for k, target in enumerate(targets) if has_round_narrow_lobe(target.live)]
+        lobe_terms = frozenset() if is_linked else frozenset(narrow)
         dense_terms = find_dense_terms(images, targets, light, lobe_terms)
         return cls(images, light, images.gain, snapshots, detail, dense_terms, lobe_terms)
 
