@@ -57,7 +57,7 @@ def bake(
         int | None, typer.Option(metavar="N", help="Surface patches for indirect light. [default: automatic]")
     ] = None,
     gather_rays: Annotated[
-        int | None, typer.Option(metavar="N", help="Gather rays per view sample or probe. [default: 610; probes: 377]")
+        int | None, typer.Option(metavar="N", help="Gather rays per view sample or probe. [default: 377]")
     ] = None,
     relightable: Annotated[
         bool, typer.Option("--relightable", help="Prepare for rotating or replacing the environment.")

@@ -40,11 +40,17 @@ from relume.raytrace.texture_arrays import texture_arrays, texture_attributes
 from relume.raytrace.visibility_masks import trace_visibility_masks
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
-from relume.views.store_io import make_material_pattern, read_ray_origins, read_surface_points, view_directions
+from relume.views.store_io import (
+    make_material_pattern,
+    make_seeds,
+    read_ray_origins,
+    read_surface_points,
+    view_directions,
+)
 
 PATCHES_PER_SHARD = 4096
-RAYS_PER_SAMPLE, RAYS_PER_POINT = 610, 55
-_GLOSSY_RAYS = 233
+RAYS_PER_SAMPLE, RAYS_PER_POINT = 377, 55
+_GLOSSY_RAYS = 144
 _PIXELS_PER_PATCH, _MIN_PATCHES = 10, 1024
 _PATCH_STAGE, _RAY_STAGE = 2, 3
 _PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_POINT) + 64
@@ -59,7 +65,6 @@ class GatherMethod:
 
     Args:
         rays: per view sample. glossy: number of these if the material has a highlight.
-        num_tent_passes: filter passes over neighboring pixels; see `relume.views.gather_filter`.
         smooths_edges: whether pixels on edges have several samples.
     """
 
@@ -71,11 +76,9 @@ class GatherMethod:
         rays: int = RAYS_PER_SAMPLE,
         glossy: int = _GLOSSY_RAYS,
         *,
-        num_tent_passes: int = 1,
         smooths_edges: bool = True,
     ) -> None:
         self._views, self._rays, self._glossy = SampledViews(smooths_edges=smooths_edges), rays, glossy
-        self._num_tent_passes = num_tent_passes
         self._patch_tree = ReadCache(read_tree)
 
     def prepare(self, scene: Scene) -> None:
@@ -110,7 +113,7 @@ class GatherMethod:
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """Return the store's attributes, with `gather_rays` (cosine, glossy) by material and filter passes."""
+        """Return the store's attributes, with `gather_rays` (cosine, glossy) by material."""
         rays, num_glossy = self._ray_counts(recipe)
         diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
         return {
@@ -119,7 +122,6 @@ class GatherMethod:
             "gather_rays": [
                 diffuse if all(map(scatters_diffusely, material.terms)) else glossy for material in scene.materials
             ],
-            "gather_filter_passes": self._num_tent_passes,
             "gather_seed": int(scene.id[:7], 16),
         }
 
@@ -209,7 +211,7 @@ class GatherMethod:
 
     def _bake_view_rows(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
         k = recipe.views.index(task.group)
-        seed, material_hits = np.arange(task.start, task.stop, dtype=np.uint32), []
+        seed, material_hits = make_seeds(store, k, recipe.size[0], task.start, task.stop), []
         points = read_surface_points(store, k, task.start, task.stop, seed)
         wo = view_directions(read_ray_origins(store, k, task.start, task.stop), points.position)
         material = store.read(f"views/{k}/material", task.start, task.stop)

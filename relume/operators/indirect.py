@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
-from scipy.sparse import eye_array
+from scipy.sparse import csr_array, eye_array
 
 from relume.brdf.term import Term
 from relume.core.thread_pools import parallel_for_cancellable, parallel_for_chunks
@@ -29,7 +29,6 @@ from relume.operators.indirect_kernel import (
     transform,
 )
 from relume.operators.interpolation import add_interpolated
-from relume.patches.neighbor_filter import FilterWeights
 from relume.transport.outgoing_patch_light import isotropic
 from relume.transport.ray_projector import RayProjector
 from relume.transport.roughness_ranges import contract_levels, split_by_level
@@ -57,7 +56,7 @@ class IndirectOperator:
     scale: Shaped[F32, "blocks K"]
     weights: Shaped[NDArray[np.int16], "blocks K channels block_samples"]
     num_samples: int
-    neighbor_weights: FilterWeights
+    neighbor_weights: csr_array
 
     @property
     def num_bytes(self) -> int:
@@ -73,10 +72,7 @@ class IndirectOperator:
         args = (self.coefficients, self.scale, self.weights, light)
         unfiltered = np.empty((len(self.coefficients) * BLOCK_SAMPLES, 4), np.float32)
         parallel_for_chunks(lambda start, stop: apply_rows(*args, start, stop, unfiltered), len(self.coefficients))
-        matrix, num_passes = self.neighbor_weights
-        for _ in range(num_passes - 1):
-            unfiltered[: self.num_samples] = matrix @ unfiltered[: self.num_samples]
-        add_interpolated(matrix, unfiltered, image)
+        add_interpolated(self.neighbor_weights, unfiltered, image)
 
 
 def row_bytes(num_samples: int, num_channels: int) -> int:
@@ -143,8 +139,8 @@ def precompute_rows(
     return rows
 
 
-def _identity_weights(num_samples: int) -> FilterWeights:
-    return FilterWeights(eye_array(num_samples, dtype=np.float32, format="csr"), 1)
+def _identity_weights(num_samples: int) -> csr_array:
+    return eye_array(num_samples, dtype=np.float32, format="csr")
 
 
 class _RowMaker:

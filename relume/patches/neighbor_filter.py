@@ -1,8 +1,8 @@
-"""Filter for the light of gather rays: weighted means over neighboring points, in one or several passes."""
+"""Filter for the light of gather rays: weighted means over neighboring points."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -11,56 +11,46 @@ from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
 
-
-class FilterWeights(NamedTuple):
-    """Filter weights of n points.
-
-    Attributes:
-        matrix: rows sum to one. (n, n) sparse, float32
-        num_passes: number of times that values are replaced by their weighted means.
-    """
-
-    matrix: Any
-    num_passes: int
-
-    def find_dependencies(self, start: int, stop: int) -> tuple[list[Any], NDArray[np.intp]]:
-        """Find the points whose values points [start, stop) depend on.
-
-        Returns:
-            Matrices to multiply with these points' values, the last one first; and the points.
-        """
-        needed, matrices = np.arange(start, stop), list[Any]()
-        compact_index, is_neighbor = np.empty(self.matrix.shape[1], np.int32), np.zeros(self.matrix.shape[1], np.bool_)
-        for _ in range(self.num_passes):
-            rows = self.matrix[needed]
-            is_neighbor[rows.indices] = True
-            neighbors = np.flatnonzero(is_neighbor)
-            compact_index[neighbors] = np.arange(len(neighbors))
-            matrices.append(
-                csr_array((rows.data, compact_index[rows.indices], rows.indptr), shape=(len(needed), len(neighbors)))
-            )
-            is_neighbor[neighbors], needed = False, neighbors
-        return matrices, needed
-
-    def within(self, is_member: Shaped[NDArray[np.bool_], " n"]) -> FilterWeights:
-        """Return the filter among some points alone; the values of all others become zero."""
-        matrix, member = self.matrix, is_member.astype(np.float32)
-        kept = csr_array((matrix.data * member[matrix.indices], matrix.indices, matrix.indptr), shape=matrix.shape)
-        scale = member / np.maximum(kept @ np.ones_like(member), np.float32(1e-6))
-        data = kept.data * np.repeat(scale, np.diff(matrix.indptr))
-        return FilterWeights(csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape), self.num_passes)
+F32 = NDArray[np.float32]
 
 
 class NeighborFilter(NamedTuple):
-    """Filters for the light of gather rays; see `relume.views.gather_filter`.
+    """Filters for the light of gather rays of n points; see `relume.views.gather_filter`.
 
     Attributes:
-        diffuse: weights for diffuse terms. highlights: weights for directional terms.
+        diffuse: weights for diffuse terms, (n, n) sparse; rows sum to one. highlights: for directional terms.
+        inverse_distance: mean of 1 / distance over the rays of each point, 1 / scene unit.
     """
 
-    diffuse: FilterWeights
-    highlights: FilterWeights
+    diffuse: csr_array
+    highlights: csr_array
+    inverse_distance: Shaped[F32, " n"]
 
-    def weights_for(self, term: Term) -> FilterWeights:
+    def weights_for(self, term: Term) -> csr_array:
         """Return the weights for a term."""
         return self.diffuse if term.scatters_diffusely else self.highlights
+
+
+def weights_of_rows(weights: csr_array, start: int, stop: int) -> tuple[csr_array, Shaped[NDArray[np.intp], " k"]]:
+    """Find the points whose values points [start, stop) depend on.
+
+    Returns:
+        Weights of these points alone, (stop - start, k), and the points.
+    """
+    rows = weights[start:stop]
+    first = rows.indices.min(initial=weights.shape[1])
+    is_neighbor = np.zeros(rows.indices.max(initial=first - 1) + 1 - first, np.bool_)
+    is_neighbor[rows.indices - first] = True
+    column = np.cumsum(is_neighbor, dtype=np.int32) - 1
+    neighbors = first + np.flatnonzero(is_neighbor)
+    shape = stop - start, len(neighbors)
+    return csr_array((rows.data, column[rows.indices - first], rows.indptr), shape=shape), neighbors
+
+
+def weights_within(weights: csr_array, is_member: Shaped[NDArray[np.bool_], " n"]) -> csr_array:
+    """Return the weights among some points alone; the values of all others become zero."""
+    member = is_member.astype(np.float32)
+    kept = csr_array((weights.data * member[weights.indices], weights.indices, weights.indptr), shape=weights.shape)
+    scale = member / np.maximum(kept @ np.ones_like(member), np.float32(1e-6))
+    data = kept.data * np.repeat(scale, np.diff(weights.indptr))
+    return csr_array((data, weights.indices, weights.indptr), shape=weights.shape)

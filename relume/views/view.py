@@ -20,7 +20,9 @@ from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
 from relume.images.image_store import load_emission_image, load_texture
 from relume.math.uv_transform import UvTransform
+from relume.patches.hit_distance import mean_inverse_distance
 from relume.patches.neighbor_filter import NeighborFilter
+from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Camera
@@ -36,6 +38,7 @@ from relume.views.store_io import (
     make_material_pattern,
     read_camera,
     read_level_pairs,
+    read_patch_position,
     read_ray_origins,
     read_roughness_levels,
     read_rows_by_block,
@@ -260,7 +263,7 @@ class View:
         rows = self.rows(material)
         gather_hits = self.store.read(f"views/{self.index}/gather_hits", rows.start, rows.stop)
         pattern = make_material_pattern(self.store, self.index, material)
-        return GatherRays(gather_hits, pattern, no_light(), self._neighbor_filter(material))
+        return GatherRays(gather_hits, pattern, no_light(), self._neighbor_filter(material, gather_hits, pattern))
 
     def mirror_lights(self, material: int) -> Shaped[NDArray[np.uint8], "n bytes"]:
         """Read the virtual lights in planar mirrors that a material's samples see, as bits."""
@@ -282,12 +285,17 @@ class View:
         if isinstance(self.store, RayTracing):
             self.store.trace_gather_rays(self.rows(material).start, is_canceled)
 
-    def _neighbor_filter(self, material: int) -> NeighborFilter:
+    def _neighbor_filter(
+        self, material: int, gather_hits: Shaped[NDArray[np.uint16], "n rays"], pattern: RayPattern
+    ) -> NeighborFilter:
         def build_filter() -> NeighborFilter:
-            num_passes = int(self.store.attributes.get("gather_filter_passes", 1))
-            return make_neighbor_filter(
-                self.pixel[self.rows(material)], self.width, self.surface_points(material), num_passes
-            )
+            points, patch_position = self.surface_points(material), read_patch_position(self.store)
+            if patch_position is None:  # not known: the filter depends on normals alone
+                inverse_distance = np.zeros(points.num_points, np.float32)
+            else:
+                cosine_hits = gather_hits[:, : pattern.num_cosine]
+                inverse_distance = mean_inverse_distance(points.position, cosine_hits, patch_position)
+            return make_neighbor_filter(self.pixel[self.rows(material)], self.width, points, inverse_distance)
 
         return self.cache.get_value((self.key, "neighbor filter", *self.sample_key(material)), build_filter)
 

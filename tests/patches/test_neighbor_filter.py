@@ -12,7 +12,9 @@ from scipy.sparse import csr_array
 
 from relume.brdf.registry import TERMS
 from relume.lights.spherical_triangles import tessellate_environment
-from relume.patches.neighbor_filter import FilterWeights, NeighborFilter
+from relume.patches.hit_distance import mean_inverse_distance
+from relume.patches.neighbor_filter import NeighborFilter, weights_within
+from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.transport.outgoing_patch_light import isotropic
@@ -32,33 +34,35 @@ def grid(keep=None):
     return pixel, position, np.tile(np.array([0, 1, 0], np.float32), (len(pixel), 1))
 
 
-def filter_of(pixel, position, normal, chance=FIXED_ALPHA_SAMPLE, **options):
+def filter_of(pixel, position, normal, inverse_distance=None, chance=FIXED_ALPHA_SAMPLE):
     points = SurfacePoints(position, normal, np.zeros_like(normal), pixel, chance)
-    return make_neighbor_filter(pixel, WIDTH, points, **options)
+    inverse_distance = np.zeros(len(pixel), np.float32) if inverse_distance is None else inverse_distance
+    return make_neighbor_filter(pixel, WIDTH, points, inverse_distance)
 
 
-def brute_force_weights(pixel, is_same):
-    """Every pair of samples, one after another."""
+def brute_force_weights(pixel, closeness):
+    """Every pair of samples, one after another. closeness: 1 - change / largest change of samples a and b"""
     weights = np.zeros((len(pixel), len(pixel)))
     for a, pa in enumerate(pixel.astype(int)):
         for b, pb in enumerate(pixel.astype(int)):
             dx, dy = abs(pa % WIDTH - pb % WIDTH), abs(pa // WIDTH - pb // WIDTH)
-            if a == b or (max(dx, dy) <= 1 and is_same(a, b)):
-                weights[a, b] = (2 - dx) * (2 - dy) / np.count_nonzero(pixel == pb)
+            if max(dx, dy) <= 2:
+                tent = (3 - dx) * (3 - dy) / np.count_nonzero(pixel == pb)
+                weights[a, b] = tent * (1 if a == b else max(closeness(a, b), 0))
     return weights / weights.sum(axis=1, keepdims=True)
 
 
 def test_neighbors_have_tent_weights_normalized_at_image_borders():
     pixel, position, normal = grid()
-    matrix = filter_of(pixel, position, normal).diffuse.matrix
-    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: True), rtol=1e-6)
+    matrix = filter_of(pixel, position, normal).diffuse
+    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: 1), rtol=1e-6)
     np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_samples_of_one_pixel_are_averaged():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    matrix = filter_of(pixel, position, normal).diffuse.matrix
-    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: True), rtol=1e-6)
+    matrix = filter_of(pixel, position, normal).diffuse
+    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: 1), rtol=1e-6)
 
 
 def test_separate_surfaces_are_not_neighbors():
@@ -66,8 +70,8 @@ def test_separate_surfaces_are_not_neighbors():
     pixel, position, normal = grid()
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
-    position[(x <= 4) & (y > 3), 1] += 0.5
-    matrix = filter_of(pixel, position, normal).diffuse.matrix.toarray()
+    position[(x <= 4) & (y > 3), 1] += 1.0
+    matrix = filter_of(pixel, position, normal).diffuse.toarray()
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
     flat = piece != 2  # depth along the wall is height
     assert not matrix[piece[:, None] != piece[None, :]].any()
@@ -78,47 +82,45 @@ def test_separate_surfaces_are_not_neighbors():
 def test_samples_of_different_channels_are_not_neighbors():
     pixel, position, normal = (np.concatenate([a, a]) for a in grid())
     chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
-    matrix = filter_of(pixel, position, normal, chance).diffuse.matrix.toarray()
+    matrix = filter_of(pixel, position, normal, chance=chance).diffuse.toarray()
     assert not matrix[chance[:, None] != chance].any()
     np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
-def test_highlights_are_filtered_between_similar_orientations():
-    """Every second column of a floor is rotated, first slightly, then more; diffuse light ignores the rotation."""
+def test_weights_fall_with_distance_and_turn_as_light_may_change():
+    """Rows of the floor turn by up to 4°; surfaces come near at one side. Highlights change four times as fast."""
     pixel, position, normal = grid()
-    is_turned = pixel % WIDTH % 2
+    angle = np.radians(pixel // WIDTH % 3 * 2.0)
+    normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
+    inverse_distance = np.asarray(0.002 * (1 + pixel % WIDTH), np.float32)
 
-    def both(degrees):
-        angle = np.radians(degrees) * is_turned
-        normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
-        weights = filter_of(pixel, position, normal)
-        return weights.diffuse.matrix.toarray(), weights.highlights.matrix.toarray()
+    def closeness(a, b, largest):
+        near = max(inverse_distance[a], inverse_distance[b])
+        change = near * np.linalg.norm(position[a] - position[b]) + np.linalg.norm(normal[a] - normal[b])
+        return 1 - change / largest
 
-    all_alike = brute_force_weights(pixel, lambda a, b: True)
-    for matrix in (*both(2.0), both(5.0)[0]):
-        np.testing.assert_allclose(matrix, all_alike, rtol=1e-6)
-    np.testing.assert_allclose(
-        both(5.0)[1], brute_force_weights(pixel, lambda a, b: is_turned[a] == is_turned[b]), rtol=1e-6
-    )
-
-
-def test_diffuse_light_has_several_tent_passes_and_highlights_one():
-    pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
-    weights = filter_of(pixel, position, normal, num_passes=3)
-    assert (weights.diffuse.num_passes, weights.highlights.num_passes) == (3, 1)
-    rings, among = weights.diffuse.find_dependencies(4, 11)
-    values = np.random.default_rng(9).random((len(pixel), 3))
-    once = brute_force_weights(pixel, lambda a, b: True)
-    shared = values[among]
-    for within in reversed(rings):
-        shared = within @ shared
-    np.testing.assert_allclose(shared, (once @ once @ once @ values)[4:11], rtol=1e-5)
+    weights = filter_of(pixel, position, normal, inverse_distance)
+    for matrix, largest in ((weights.diffuse, 0.2), (weights.highlights, 0.05)):
+        expected = brute_force_weights(pixel, lambda a, b, largest=largest: closeness(a, b, largest))
+        assert 0.01 < np.mean(expected == 0) < 0.9
+        np.testing.assert_allclose(matrix.toarray(), expected, atol=2e-5)
 
 
-@pytest.mark.parametrize("times", [1, 2])
+def test_distances_are_harmonic_means_over_the_rays_that_meet_patches():
+    rng = np.random.default_rng(4)
+    position, patch_position = rng.random((6, 3), np.float32), rng.random((9, 4, 3), np.float32)
+    hits = rng.integers(0, 9, (6, 24)).astype(np.uint16)
+    hits[rng.random(hits.shape) < 0.3] = NO_PATCH
+    hits[0] = NO_PATCH
+    used = hits[:, ::4]
+    distance = np.linalg.norm(patch_position.mean(axis=1)[used % 9] - position[:, None], axis=2)
+    expected = np.where(used == NO_PATCH, 0, 1 / distance).mean(axis=1)
+    np.testing.assert_allclose(mean_inverse_distance(position, hits, patch_position), expected, rtol=1e-5)
+
+
 @pytest.mark.parametrize("model", ["lambert", "cook_torrance"])
 @pytest.mark.parametrize("is_active", [False, True])
-def test_projected_points_are_weighted_means_of_single_points(model, is_active, times):
+def test_projected_points_are_weighted_means_of_single_points(model, is_active):
     """Free and contracted curves, in ranges of any length; environment light is not filtered."""
     rng, num = np.random.default_rng(2), 70
     lights = tessellate_environment(rng.random((16, 32, 3), np.float32), 40)
@@ -138,11 +140,12 @@ def test_projected_points_are_weighted_means_of_single_points(model, is_active, 
 
     dark = project((), [(0, num)])
     separate = project((alone,), [(0, num)]) - dark
-    nobody = FilterWeights(csr_array((num, num), dtype=np.float32), 1)
-    of_term = FilterWeights(csr_array(weights / weights.sum(axis=1)[:, None]), times)
-    neighbor_filter = NeighborFilter(of_term, nobody) if model == "lambert" else NeighborFilter(nobody, of_term)
+    nobody = csr_array((num, num), dtype=np.float32)
+    of_term = csr_array(weights / weights.sum(axis=1)[:, None])
+    pair = (of_term, nobody) if model == "lambert" else (nobody, of_term)
+    neighbor_filter = NeighborFilter(*pair, np.zeros(num, np.float32))
     shared = project((replace(alone, sharing=neighbor_filter),), [(0, 50), (50, num)]) - dark
-    expected = np.einsum("pq,qjc->pjc", np.linalg.matrix_power(of_term.matrix.toarray(), times), separate)
+    expected = np.einsum("pq,qjc->pjc", of_term.toarray(), separate)
     np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())
 
 
@@ -150,6 +153,6 @@ def test_a_filter_within_some_samples_ignores_all_others():
     pixel, position, normal = grid()
     weights = filter_of(pixel, position, normal).highlights
     is_member = np.random.default_rng(2).random(len(pixel)) < 0.6
-    expected = weights.matrix.toarray() * is_member * is_member[:, None]
+    expected = weights.toarray() * is_member * is_member[:, None]
     expected[is_member] /= expected[is_member].sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(weights.within(is_member).matrix.toarray(), expected, rtol=1e-5)
+    np.testing.assert_allclose(weights_within(weights, is_member).toarray(), expected, rtol=1e-5)

@@ -116,8 +116,7 @@ def _subsample(
             isinstance(subset_rays, GatherRays) and isinstance(all_rays, GatherRays) and all_rays.sharing is not None
         ):
             return subset_rays
-        return replace(
-            subset_rays, sharing=make_neighbor_filter(block, width, subset.points, all_rays.sharing.diffuse.num_passes)
-        )
+        inverse_distance = all_rays.sharing.inverse_distance[sample_indices]
+        return replace(subset_rays, sharing=make_neighbor_filter(block, width, subset.points, inverse_distance))
 
     return replace(subset, rays=tuple(map(shared, subset.rays, receivers.rays)))

@@ -40,10 +40,11 @@ from relume.operators.image_cache import ImageFiles
 from relume.scene.custom_camera import with_cameras
 from relume.scene.model import Camera, Scene
 from relume.store.bake_protocol import Recipe, Task
+from relume.views.store_io import make_seeds
 from relume.views.view import View, open_view
 
 # a fifth of a bake's rays, both lattices of Fibonacci size; their light is shared with more neighbors
-_RAYS, _GLOSSY_RAYS, _NUM_TENT_PASSES = 123, 34, 2
+_RAYS, _GLOSSY_RAYS = 123, 34
 _ROWS_PER_TASK = 4096  # at most half a second of work, which bounds the time to cancel
 _SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the stage between these is in the bake
 _LIGHT_FRACTION = 0.3  # of the progress of a view with edited glass; the rest is the view
@@ -148,7 +149,7 @@ class StaticTracing:
             store.allocate(s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
         # includes the seeds of local lights' shadows, which do not need gather rays
         if (seeds := store.arrays.get("views/0/seed")) is not None:
-            seeds[:] = np.arange(len(seeds))
+            seeds[:] = make_seeds(store, 0, recipe.size[0], 0, len(seeds))
         shadow_tasks, *hit_tasks = (
             list(split_tasks((t for t in method.tasks(k, scene, recipe, store) if t.group), _ROWS_PER_TASK))
             for k in view_stages
@@ -195,7 +196,7 @@ class StaticViewBuilder:
     def __init__(self, light_transport: BakedFixedViews, scene: Scene) -> None:
         self._light_transport, self._scene = light_transport, scene
         self._smooth, self._sparse = (
-            GatherMethod(_RAYS, _GLOSSY_RAYS, num_tent_passes=_NUM_TENT_PASSES, smooths_edges=smooths_edges)
+            GatherMethod(_RAYS, _GLOSSY_RAYS, smooths_edges=smooths_edges)
             if isinstance(light_transport, BakedIndirectViews)
             else DirectMethod(smooths_edges=smooths_edges)
             for smooths_edges in (True, False)
