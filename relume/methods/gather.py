@@ -40,9 +40,9 @@ from relume.raytrace.texture_arrays import texture_arrays, texture_attributes
 from relume.raytrace.visibility_masks import trace_visibility_masks
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
+from relume.views.sample_seeds import make_seeds
 from relume.views.store_io import (
     make_material_pattern,
-    make_seeds,
     read_ray_origins,
     read_surface_points,
     view_directions,

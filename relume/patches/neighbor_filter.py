@@ -34,8 +34,10 @@ class NeighborFilter(NamedTuple):
 def weights_of_rows(weights: csr_array, start: int, stop: int) -> tuple[csr_array, Shaped[NDArray[np.intp], " k"]]:
     """Find the points whose values points [start, stop) depend on.
 
+    Args:
+        weights: of all points, (n, n). start, stop: the points.
     Returns:
-        Weights of these points alone, (stop - start, k), and the points.
+        Weights of the points that are found, (stop - start, k), and the points.
     """
     rows = weights[start:stop]
     first = rows.indices.min(initial=weights.shape[1])
@@ -48,7 +50,11 @@ def weights_of_rows(weights: csr_array, start: int, stop: int) -> tuple[csr_arra
 
 
 def weights_within(weights: csr_array, is_member: Shaped[NDArray[np.bool_], " n"]) -> csr_array:
-    """Return the weights among some points alone; the values of all others become zero."""
+    """Return the weights among some points alone; the values of all others become zero.
+
+    Args:
+        weights: of all points, (n, n). is_member: of the points.
+    """
     member = is_member.astype(np.float32)
     kept = csr_array((weights.data * member[weights.indices], weights.indices, weights.indptr), shape=weights.shape)
     scale = member / np.maximum(kept @ np.ones_like(member), np.float32(1e-6))

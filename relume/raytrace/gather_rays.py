@@ -16,7 +16,6 @@ So the same ray of neighbors has nearly the same direction, and may be traced to
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numba as nb
@@ -37,9 +36,8 @@ _LN = np.float32(math.log(1 + 1e3))
 _GOLDEN = (1 + math.sqrt(5)) / 2
 # the last two steps of Roberts' R4 sequence, as fractions of 2^32: independent of the lattices
 _PLASTIC = 1.1673039782614187  # x⁵ = x + 1
-_STEP_U, _STEP_V = (np.uint32(round(2**32 / _PLASTIC**k)) for k in (3, 4))
+STEP_U, STEP_V = (np.uint32(round(2**32 / _PLASTIC**k)) for k in (3, 4))
 _PER_UNIT = np.float32(1 / (1 << 24))
-_SIDE, _SEEDS_PER_PART = 3, 7000  # of 3 × 3 parts of a lattice cell; 1 / 9 of 2^16 seeds lie in each
 
 
 class RayPattern(NamedTuple):
@@ -111,36 +109,6 @@ def shortest_lattice_vectors(count: int) -> F64:
         longer = longer - multiple * shorter
 
 
-@cache
-def _seeds_by_part() -> Shaped[NDArray[np.uint32], "parts seeds"]:
-    """Seeds whose offsets lie in each of 3 × 3 parts of the unit square, in the order of the sequence."""
-    seed = np.arange(1 << 16, dtype=np.uint32)
-    row, column = ((_SIDE * (seed * step / 2**32)).astype(np.intp) for step in (_STEP_U, _STEP_V))
-    part = _SIDE * row + column
-    return np.stack([seed[part == k][:_SEEDS_PER_PART] for k in range(_SIDE * _SIDE)])
-
-
-def interleaved_seeds(
-    pixel: Shaped[NDArray[np.integer], " n"], width: int, first_row: int
-) -> Shaped[NDArray[np.uint32], " n"]:
-    """Return seeds of view samples, so that those of 3 × 3 pixels shift the patterns to all parts of a lattice cell.
-
-    Means over neighboring samples then have as little noise as one sample with many times the rays (interleaved
-    sampling: Keller and Heidrich 2001). Within its part, each shift is another one. Samples of one pixel have
-    different parts.
-
-    Args:
-        pixel: y · width + x of each sample; samples of one pixel follow one another. width: of the image, pixels.
-        first_row: number of the first sample in its view.
-    """
-    row = np.arange(len(pixel))
-    is_first = np.diff(pixel.astype(np.int64), prepend=-1) != 0
-    rank = row - np.maximum.accumulate(np.where(is_first, row, 0))
-    y, x = np.divmod(pixel.astype(np.int64), width)
-    part = (x + rank) % _SIDE * _SIDE + (y + rank // _SIDE) % _SIDE
-    return np.asarray(_seeds_by_part()[part, (first_row + row) % _SEEDS_PER_PART])
-
-
 # The following functions are inlined: calls would count references to the pattern's arrays, which threads share.
 @nb.njit(nogil=True, cache=True, inline="always")
 def cranley_patterson_offset(pattern, seed):  # type: ignore[no-untyped-def]
@@ -149,8 +117,8 @@ def cranley_patterson_offset(pattern, seed):  # type: ignore[no-untyped-def]
     Offsets of successive seeds are a low-discrepancy sequence.
     """
     start = np.uint32(pattern.seed) * np.uint32(0x9E3779B9)
-    u = np.uint32(start + np.uint32(seed) * _STEP_U)
-    v = np.uint32(start + np.uint32(seed) * _STEP_V)
+    u = np.uint32(start + np.uint32(seed) * STEP_U)
+    v = np.uint32(start + np.uint32(seed) * STEP_V)
     return np.float32(u >> np.uint32(8)) * _PER_UNIT, np.float32(v >> np.uint32(8)) * _PER_UNIT
 
 

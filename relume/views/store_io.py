@@ -10,7 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ChunkDamagedError, ParameterError, SceneError, StoreError
-from relume.raytrace.gather_rays import RayPattern, interleaved_seeds, make_pattern
+from relume.raytrace.gather_rays import RayPattern, make_pattern
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.scene.lens import read_lens
 from relume.scene.model import Camera
@@ -20,7 +20,6 @@ from relume.store.bake_protocol import StoreReader
 F32 = NDArray[np.float32]
 
 _ROWS_PER_BLOCK = 8192
-_MOST_OF_A_PIXEL = 1024  # samples, of which some may lie before the rows of a task
 
 
 @runtime_checkable
@@ -97,18 +96,6 @@ def read_patch_position(store: StoreReader) -> Shaped[F32, "patches points 3"] |
         raise
     except StoreError:
         return None
-
-
-def make_seeds(store: StoreReader, k: int, width: int, start: int, stop: int) -> Shaped[NDArray[np.uint32], " n"]:
-    """Return the seeds of gather rays for samples, see `interleaved_seeds`.
-
-    Args:
-        store: with the pixels of the samples. k: index of the view. width: of its image, pixels.
-        start, stop: rows of its arrays.
-    """
-    begin = max(start - _MOST_OF_A_PIXEL, 0)
-    pixel = store.read(f"views/{k}/pixel", begin, stop)
-    return interleaved_seeds(pixel, width, begin)[start - begin :]
 
 
 def read_surface_points(

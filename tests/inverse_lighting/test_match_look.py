@@ -231,6 +231,6 @@ def test_the_rotation_of_the_environment_comes_back(gathered, render, tmp_path):
     result = match_look(look, render, render, SIZE, MatchRequest(reference=data, rotates=True))
     assert matched(look, result).environment.rotation == pytest.approx(130.0, abs=2.0)
     locked = match_look(
-        look, render, SIZE, MatchRequest(reference=data, rotates=True, locked=frozenset(["/environment"]))
+        look, render, render, SIZE, MatchRequest(reference=data, rotates=True, locked=frozenset(["/environment"]))
     )
     assert matched(look, locked).environment == look.environment

@@ -40,7 +40,7 @@ from relume.operators.image_cache import ImageFiles
 from relume.scene.custom_camera import with_cameras
 from relume.scene.model import Camera, Scene
 from relume.store.bake_protocol import Recipe, Task
-from relume.views.store_io import make_seeds
+from relume.views.sample_seeds import make_seeds
 from relume.views.view import View, open_view
 
 # a fifth of a bake's rays, both lattices of Fibonacci size; their light is shared with more neighbors
