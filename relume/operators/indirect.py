@@ -126,7 +126,7 @@ def precompute_rows(
         np.empty((blocks, NUM_COEFFICIENTS), np.float32),
         np.empty((blocks, NUM_COEFFICIENTS, num_channels(term, bands), BLOCK_SAMPLES), np.int16),
         num_samples,
-        _identity_weights(num_samples) if rays.sharing is None else rays.sharing.weights_for(term),
+        _identity_weights(num_samples) if rays.sharing is None else rays.sharing.weights(term, 0, num_samples),
     )
 
     def step(first: int, last: int) -> None:

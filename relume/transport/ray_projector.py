@@ -10,7 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
-from relume.patches.neighbor_filter import NeighborFilter, weights_of_rows
+from relume.patches.neighbor_filter import NeighborFilter
 from relume.transport.diffuse_projector import diffuse_quotients, is_constant
 from relume.transport.ray_kernel import allocate_scratch, project_rays, sum_rays, weight_rays
 from relume.transport.shading_points import GatherRays, RayList, ShadingPoints, allocate_list, is_area_light
@@ -47,7 +47,7 @@ class RayProjector:
 
     def _add_shared(self, rays: GatherRays, sharing: NeighborFilter, start: int, stop: int, out: F32) -> None:
         """Add the light of points' own rays and of their neighbors' rays."""
-        weights, rows = weights_of_rows(sharing.weights_for(self._term), start, stop)
+        weights, rows = sharing.weights_and_neighbors(self._term, start, stop)
         radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)
         self._add(rays.unshared(rows), self._receivers.without_light(rows), 0, len(rows), radiance)
         out += (weights @ radiance.reshape(len(rows), -1)).reshape(out.shape)

@@ -30,7 +30,6 @@ from relume.store.bake_protocol import StoreReader
 from relume.transport.outgoing_patch_light import no_light
 from relume.transport.shading_points import GatherRays, ShadingPoints
 from relume.views.frost_filter import REACH, FrostFilter, make_frost_filter
-from relume.views.gather_filter import make_neighbor_filter
 from relume.views.mirror_samples import MirrorSamples, read_mirror_samples
 from relume.views.store_io import (
     RayTracing,
@@ -295,7 +294,7 @@ class View:
             else:
                 cosine_hits = gather_hits[:, : pattern.num_cosine]
                 inverse_distance = mean_inverse_distance(points.position, cosine_hits, patch_position)
-            return make_neighbor_filter(self.pixel[self.rows(material)], self.width, points, inverse_distance)
+            return NeighborFilter.of_samples(self.pixel[self.rows(material)], self.width, points, inverse_distance)
 
         return self.cache.get_value((self.key, "neighbor filter", *self.sample_key(material)), build_filter)
 

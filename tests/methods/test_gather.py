@@ -423,7 +423,7 @@ def test_the_displayed_paths_can_change_in_a_session(gathered, monkeypatch):
 
 def test_a_downsampled_bake_has_the_same_light(gathered, monkeypatch):
     """Its samples keep their traced rays; neighbors differ."""
-    monkeypatch.setattr("relume.views.view.make_neighbor_filter", lambda *of_samples: None)
+    monkeypatch.setattr("relume.views.view.NeighborFilter.of_samples", lambda *of_samples: None)
     transfer, step = open_transfer(Path(gathered.key), Cache(1 << 30)), 3
     whole = Picture(transfer, "front", Cache(BUDGET))
     few = Picture(transfer.downsampled("front", step), "front", Cache(BUDGET))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import numpy_reference as ref
@@ -19,7 +20,6 @@ from relume.operators import indirect as rows_module
 from relume.operators.indirect import expected_light, num_channels, precompute_rows, row_bytes
 from relume.operators.indirect_kernel import select_coefficients, transform
 from relume.operators.linear_operator import tile_layout
-from relume.patches.neighbor_filter import NeighborFilter
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import make_pattern
 from relume.transport.outgoing_patch_light import isotropic
@@ -77,7 +77,7 @@ def test_rows_are_filtered_like_rays(receivers):
     weights = csr_array(rng.random((NUM_POINTS,) * 2) * (rng.random((NUM_POINTS,) * 2) < 0.02) + np.eye(NUM_POINTS))
     (rays,) = receivers.rays
     weights = csr_array(weights / weights.sum(axis=1)[:, None]).astype(np.float32)
-    sharing = NeighborFilter(weights, 0 * weights, np.zeros(NUM_POINTS, np.float32))
+    sharing = SimpleNamespace(weights=lambda term, start, stop: weights[start:stop])
     shared = replace(receivers, rays=(replace(rays, sharing=sharing),))
     term, bands = TERMS["lambert"], bands_of(TERMS["lambert"])
     expected = weights.toarray() @ image_by_rows(term, bands, receivers, light(1))

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from relume.brdf.registry import TERMS
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.patches.hit_distance import mean_inverse_distance
-from relume.patches.neighbor_filter import NeighborFilter, weights_within
+from relume.patches.neighbor_filter import NeighborFilter
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
@@ -21,7 +21,6 @@ from relume.transport.outgoing_patch_light import isotropic
 from relume.transport.projector import Projector
 from relume.transport.shading_points import GatherRays
 from relume.transport.term_contraction import contract
-from relume.views.gather_filter import make_neighbor_filter
 
 WIDTH, HEIGHT = 9, 7
 
@@ -37,7 +36,27 @@ def grid(keep=None):
 def filter_of(pixel, position, normal, inverse_distance=None, chance=FIXED_ALPHA_SAMPLE):
     points = SurfacePoints(position, normal, np.zeros_like(normal), pixel, chance)
     inverse_distance = np.zeros(len(pixel), np.float32) if inverse_distance is None else inverse_distance
-    return make_neighbor_filter(pixel, WIDTH, points, inverse_distance)
+    return NeighborFilter.of_samples(pixel, WIDTH, points, inverse_distance)
+
+
+def diffuse_weights(*of_samples, **options):
+    return all_weights(filter_of(*of_samples, **options), "lambert")
+
+
+def all_weights(neighbor_filter, model):
+    return neighbor_filter.weights(TERMS[model], 0, len(neighbor_filter.pixel)).toarray()
+
+
+class SharedByMatrix(NeighborFilter):
+    """Any weights, for terms of one kind."""
+
+    def __init__(self, matrix, model):
+        object.__setattr__(self, "matrix", matrix)
+        object.__setattr__(self, "model", model)
+
+    def weights_and_neighbors(self, term, start, stop):
+        assert term.model == self.model
+        return self.matrix[start:stop], np.arange(self.matrix.shape[1])
 
 
 def brute_force_weights(pixel, closeness):
@@ -54,15 +73,15 @@ def brute_force_weights(pixel, closeness):
 
 def test_neighbors_have_tent_weights_normalized_at_image_borders():
     pixel, position, normal = grid()
-    matrix = filter_of(pixel, position, normal).diffuse
-    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: 1), rtol=1e-6)
+    matrix = diffuse_weights(pixel, position, normal)
+    np.testing.assert_allclose(matrix, brute_force_weights(pixel, lambda a, b: 1), rtol=1e-6)
     np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_samples_of_one_pixel_are_averaged():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    matrix = filter_of(pixel, position, normal).diffuse
-    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: 1), rtol=1e-6)
+    matrix = diffuse_weights(pixel, position, normal)
+    np.testing.assert_allclose(matrix, brute_force_weights(pixel, lambda a, b: 1), rtol=1e-6)
 
 
 def test_separate_surfaces_are_not_neighbors():
@@ -71,7 +90,7 @@ def test_separate_surfaces_are_not_neighbors():
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
     position[(x <= 4) & (y > 3), 1] += 1.0
-    matrix = filter_of(pixel, position, normal).diffuse.toarray()
+    matrix = diffuse_weights(pixel, position, normal)
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
     flat = piece != 2  # depth along the wall is height
     assert not matrix[piece[:, None] != piece[None, :]].any()
@@ -82,7 +101,7 @@ def test_separate_surfaces_are_not_neighbors():
 def test_samples_of_different_channels_are_not_neighbors():
     pixel, position, normal = (np.concatenate([a, a]) for a in grid())
     chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
-    matrix = filter_of(pixel, position, normal, chance=chance).diffuse.toarray()
+    matrix = diffuse_weights(pixel, position, normal, chance=chance)
     assert not matrix[chance[:, None] != chance].any()
     np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
@@ -100,10 +119,10 @@ def test_weights_fall_with_distance_and_turn_as_light_may_change():
         return 1 - change / largest
 
     weights = filter_of(pixel, position, normal, inverse_distance)
-    for matrix, largest in ((weights.diffuse, 0.2), (weights.highlights, 0.05)):
+    for model, largest in (("lambert", 0.2), ("ggx", 0.05)):
         expected = brute_force_weights(pixel, lambda a, b, largest=largest: closeness(a, b, largest))
         assert 0.01 < np.mean(expected == 0) < 0.9
-        np.testing.assert_allclose(matrix.toarray(), expected, atol=2e-5)
+        np.testing.assert_allclose(all_weights(weights, model), expected, atol=2e-5)
 
 
 def test_distances_are_harmonic_means_over_the_rays_that_meet_patches():
@@ -140,19 +159,28 @@ def test_projected_points_are_weighted_means_of_single_points(model, is_active):
 
     dark = project((), [(0, num)])
     separate = project((alone,), [(0, num)]) - dark
-    nobody = csr_array((num, num), dtype=np.float32)
     of_term = csr_array(weights / weights.sum(axis=1)[:, None])
-    pair = (of_term, nobody) if model == "lambert" else (nobody, of_term)
-    neighbor_filter = NeighborFilter(*pair, np.zeros(num, np.float32))
+    neighbor_filter = SharedByMatrix(of_term, model)
     shared = project((replace(alone, sharing=neighbor_filter),), [(0, 50), (50, num)]) - dark
     expected = np.einsum("pq,qjc->pjc", of_term.toarray(), separate)
     np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())
 
 
-def test_a_filter_within_some_samples_ignores_all_others():
+def test_highlights_are_shared_among_some_samples_alone():
     pixel, position, normal = grid()
-    weights = filter_of(pixel, position, normal).highlights
+    weights = filter_of(pixel, position, normal)
     is_member = np.random.default_rng(2).random(len(pixel)) < 0.6
-    expected = weights.toarray() * is_member * is_member[:, None]
+    expected = all_weights(weights, "ggx") * is_member * is_member[:, None]
     expected[is_member] /= expected[is_member].sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(weights_within(weights, is_member).toarray(), expected, rtol=1e-5)
+    some = weights.among_highlights(is_member)
+    np.testing.assert_allclose(all_weights(some, "ggx"), expected, rtol=1e-5)
+    np.testing.assert_array_equal(all_weights(some, "lambert"), all_weights(weights, "lambert"))
+
+
+def test_weights_of_a_range_are_those_of_its_neighbors():
+    pixel, position, normal = (np.concatenate([a, a[:9]]) for a in grid())
+    weights = filter_of(pixel, position, normal)
+    rows, neighbors = weights.weights_and_neighbors(TERMS["lambert"], 11, 30)
+    expected = all_weights(weights, "lambert")[11:30]
+    np.testing.assert_array_equal(neighbors, np.flatnonzero(expected.any(axis=0)))
+    np.testing.assert_array_equal(rows.toarray(), expected[:, neighbors])

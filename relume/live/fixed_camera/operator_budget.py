@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from relume.core.thread_pools import num_threads
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.operators.linear_operator import NUM_NEIGHBORS, Compression, Interpolation, LinearOperator, operator_bytes
+from relume.patches.neighbor_filter import NeighborFilter
 from relume.transport.shading_points import GatherRays, RayList, ShadingPoints
-from relume.views.gather_filter import make_neighbor_filter
 from relume.views.pixel_blocks import nearest_chosen, one_per_block
 from relume.views.view import View
 
@@ -117,6 +117,6 @@ def _subsample(
         ):
             return subset_rays
         inverse_distance = all_rays.sharing.inverse_distance[sample_indices]
-        return replace(subset_rays, sharing=make_neighbor_filter(block, width, subset.points, inverse_distance))
+        return replace(subset_rays, sharing=NeighborFilter.of_samples(block, width, subset.points, inverse_distance))
 
     return replace(subset, rays=tuple(map(shared, subset.rays, receivers.rays)))

@@ -27,7 +27,6 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.opened.retrace import NormalRetracer
 from relume.math.uv_transform import UvTransform
 from relume.methods.patch_layout import read_tree
-from relume.patches.neighbor_filter import weights_within
 from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree
 from relume.raytrace.lobe_directions import LobePattern, make_lobe_pattern
 from relume.raytrace.surface_textures import (
@@ -286,7 +285,7 @@ def only_broad(rays: GatherRays, receivers: ShadingPoints, lobe: LobeSampling) -
     """
     is_broad = ~lobe.is_narrow[receivers.level]
     gather_hits = np.where(is_broad[:, None], rays.gather_hits, np.uint16(NO_PATCH))
-    sharing = rays.sharing and rays.sharing._replace(highlights=weights_within(rays.sharing.highlights, is_broad))
+    sharing = rays.sharing and rays.sharing.among_highlights(is_broad)
     return replace(rays, gather_hits=gather_hits, sharing=sharing)
 
 
