@@ -83,14 +83,14 @@ def _find_gap(values):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _split(keys, rows):  # type: ignore[no-untyped-def]
-    """Sort rows along the axis to split.
+def _split(keys, reach, rows):  # type: ignore[no-untyped-def]
+    """Sort the points of a leaf along the axis to split, in place.
 
     Returns:
         The axis, −1 if all rows are the same point; number of rows in the first child, and the split value.
     """
-    low, high = keys[rows[0]].copy(), keys[rows[0]].copy()
-    for row in rows:
+    low, high = keys[0].copy(), keys[0].copy()
+    for row in range(1, len(keys)):
         for axis in range(6):
             low[axis] = min(low[axis], keys[row, axis])
             high[axis] = max(high[axis], keys[row, axis])
@@ -99,10 +99,9 @@ def _split(keys, rows):  # type: ignore[no-untyped-def]
     axis = int(normal_axis if extent[normal_axis] > _MAX_NORMAL_EXTENT else np.argmax(extent[:3]))
     if extent[axis] <= 0:
         return -1, 0, np.float32(0)
-    values = keys[rows, axis]
-    order = np.argsort(values, kind="mergesort")
-    rows[:] = rows[order]
-    values = values[order]
+    order = np.argsort(keys[:, axis].copy(), kind="mergesort")
+    rows[:], keys[:], reach[:] = rows[order], keys[order], reach[order]
+    values = keys[:, axis]
     # normals form clusters, which are not cut; positions are split evenly
     num_first = np.searchsorted(values, np.float32(0.5) * (low[axis] + high[axis])) if axis >= 3 else _find_gap(values)
     value = np.float32(0.5) * (values[num_first - 1] + values[num_first])
@@ -112,29 +111,29 @@ def _split(keys, rows):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _light_variation(keys, reach, rows):  # type: ignore[no-untyped-def]
+def _light_variation(keys, reach):  # type: ignore[no-untyped-def]
     """Estimate the variation of light on a patch, times its points: q / (1 + q), q = Var(x) / R² + Var(n).
 
     Light changes with position by at most about 1 / R and with the normal by about 1. R is the harmonic mean distance
     of visible surfaces (the split sphere of Ward 1988); lobes resolve surfaces by their width.
 
     Args:
-        keys, reach: as in `grow_tree`. rows: points of the patch.
+        keys, reach: as in `grow_tree`, of the points of the patch.
     """
     mean, mean_inverse_reach = np.zeros(6), 0.0
-    for row in rows:
+    for row in range(len(keys)):
         mean_inverse_reach += 1 / max(reach[row], np.float32(1e-12))
         for axis in range(6):
             mean[axis] += keys[row, axis]
-    mean /= len(rows)
-    mean_inverse_reach /= len(rows)
+    mean /= len(keys)
+    mean_inverse_reach /= len(keys)
     position_variance = normal_variance = 0.0
-    for row in rows:
+    for row in range(len(keys)):
         for axis in range(3):
             position_variance += (keys[row, axis] - mean[axis]) ** 2
             normal_variance += (keys[row, 3 + axis] - mean[3 + axis]) ** 2
-    variation = (position_variance * mean_inverse_reach * mean_inverse_reach + normal_variance) / len(rows)
-    return len(rows) * variation / (1 + variation)
+    variation = (position_variance * mean_inverse_reach * mean_inverse_reach + normal_variance) / len(keys)
+    return len(keys) * variation / (1 + variation)
 
 
 @nb.njit(nogil=True, cache=True)
@@ -142,8 +141,8 @@ def _grow_nodes(keys, reach, rows, root_starts, max_leaves):  # type: ignore[no-
     """Split rows into at most `max_leaves` leaves, always the one with the largest variation of light.
 
     Args:
-        keys, reach: as in `grow_tree`.
-        rows: points, grouped by root; sorted so that those of each leaf are contiguous.
+        keys, reach, rows: as in `grow_tree`, and the number of each point; grouped by root, sorted in place so that
+            those of each leaf are contiguous.
         root_starts: begin of each root's rows, and the end. (roots + 1,) int64
     Returns:
         Axes, values and children of nodes; per leaf the begin of its rows, its parent (−1 − root if it is a root
@@ -156,13 +155,13 @@ def _grow_nodes(keys, reach, rows, root_starts, max_leaves):  # type: ignore[no-
     queue = [(0.0, 0, 0, 0, 0) for _ in range(0)]
     for root in range(num_roots):
         start, stop = root_starts[root], root_starts[root + 1]
-        heapq.heappush(queue, (-_light_variation(keys, reach, rows[start:stop]), start, stop, -1 - root, 0))
+        heapq.heappush(queue, (-_light_variation(keys[start:stop], reach[start:stop]), start, stop, -1 - root, 0))
     node, num_leaves = 0, 0
     while queue:
         _, start, stop, parent, child = heapq.heappop(queue)
         axis, num_first, value = -1, 0, np.float32(0)
         if num_leaves + len(queue) + 1 < max_leaves:
-            axis, num_first, value = _split(keys, rows[start:stop])
+            axis, num_first, value = _split(keys[start:stop], reach[start:stop], rows[start:stop])
         if axis < 0:
             leaves[num_leaves, 0], leaves[num_leaves, 1], leaves[num_leaves, 2] = start, parent, child
             num_leaves += 1
@@ -173,7 +172,7 @@ def _grow_nodes(keys, reach, rows, root_starts, max_leaves):  # type: ignore[no-
         else:
             children[parent, child] = node
         for child_side, (low, high) in enumerate(((start, start + num_first), (start + num_first, stop))):
-            heapq.heappush(queue, (-_light_variation(keys, reach, rows[low:high]), low, high, node, child_side))
+            heapq.heappush(queue, (-_light_variation(keys[low:high], reach[low:high]), low, high, node, child_side))
         node += 1
     return axes[:node], values[:node], children[:node], leaves[:num_leaves], roots
 
@@ -194,7 +193,7 @@ def grow_tree(
     rows = np.argsort(side, kind="stable")
     sides, root_starts = np.unique(side[rows], return_index=True)
     bounds = np.append(root_starts, len(rows)).astype(np.int64)
-    axes, values, children, leaves, root_nodes = _grow_nodes(keys, reach, rows, bounds, max_patches)
+    axes, values, children, leaves, root_nodes = _grow_nodes(keys[rows], reach[rows], rows, bounds, max_patches)
     order = np.argsort(leaves[:, 0])
     starts, parents, child_side = leaves[order].T
     roots, leaf_codes = np.full(num_sides, NO_PATCH_NODE, np.int32), -1 - np.arange(len(order), dtype=np.int32)
