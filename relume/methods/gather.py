@@ -33,7 +33,7 @@ from relume.methods.read_cache import ReadCache
 from relume.methods.store_layout import SHARD_ROWS, array_of_rows
 from relume.methods.view_stages import SampledViews
 from relume.patches.gather_hits import trace_gather_rays
-from relume.patches.patch_kdtree import MAX_PATCHES
+from relume.patches.patch_kdtree import MAX_PATCHES, NO_PATCH
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.texture_arrays import texture_arrays, texture_attributes
@@ -64,7 +64,7 @@ class GatherMethod:
     """Implements `relume.store.bake_protocol.BakeMethod`.
 
     Args:
-        rays: per view sample. glossy: number of these if the material has a highlight.
+        rays: per view sample. glossy: number of these if the material has a highlight. diffuse: of all other samples.
         smooths_edges: whether pixels on edges have several samples.
     """
 
@@ -75,10 +75,12 @@ class GatherMethod:
         self,
         rays: int = RAYS_PER_SAMPLE,
         glossy: int = _GLOSSY_RAYS,
+        diffuse: int = RAYS_PER_SAMPLE,
         *,
         smooths_edges: bool = True,
     ) -> None:
-        self._views, self._rays, self._glossy = SampledViews(smooths_edges=smooths_edges), rays, glossy
+        self._views, self._rays = SampledViews(smooths_edges=smooths_edges), rays
+        self._glossy, self._diffuse = glossy, min(diffuse, rays)
         self._patch_tree = ReadCache(read_tree)
 
     def prepare(self, scene: Scene) -> None:
@@ -115,7 +117,7 @@ class GatherMethod:
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
         """Return the store's attributes, with `gather_rays` (cosine, glossy) by material."""
         rays, num_glossy = self._ray_counts(recipe)
-        diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
+        diffuse, glossy = [round(rays * self._diffuse / self._rays), 0], [rays - num_glossy, num_glossy]
         return {
             **self._views.attributes(scene, recipe),
             **texture_attributes(scene),
@@ -211,28 +213,25 @@ class GatherMethod:
 
     def _bake_view_rows(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
         k = recipe.views.index(task.group)
-        seed, material_hits = make_seeds(store, k, recipe.size[0], task.start, task.stop), []
+        seed, num_rays = make_seeds(store, k, recipe.size[0], task.start, task.stop), 0
         points = read_surface_points(store, k, task.start, task.stop, seed)
         wo = view_directions(read_ray_origins(store, k, task.start, task.stop), points.position)
         material = store.read(f"views/{k}/material", task.start, task.stop)
-        geometry, tree = self._views.geometry_of(scene), self._patch_tree(store)
+        geometry, tree, trace_s = self._views.geometry_of(scene), self._patch_tree(store), 0.0
+        gather_hits = np.full((len(seed), self._ray_counts(recipe)[0]), NO_PATCH, np.uint16)
         for index in np.unique(material):
             first, stop = np.searchsorted(material, [index, index + 1])
             pattern = make_material_pattern(store, k, int(index))
-            material_hits.append(
-                trace_gather_rays(geometry, tree, points.rows(slice(first, stop)), wo[first:stop], pattern)
-            )
-        arrays = {
-            f"views/{k}/gather_hits": np.concatenate([hits.patch for hits in material_hits]),
-            f"views/{k}/seed": seed,
-        }
-        num_rays = sum(hits.num_rays for hits in material_hits)
+            hits = trace_gather_rays(geometry, tree, points.rows(slice(first, stop)), wo[first:stop], pattern)
+            gather_hits[first:stop, : pattern.num_rays] = hits.patch
+            num_rays, trace_s = num_rays + hits.num_rays, trace_s + hits.trace_s
+        arrays: dict[str, NDArray[Any]] = {f"views/{k}/gather_hits": gather_hits, f"views/{k}/seed": seed}
         if (mirror_lights := read_mirror_lights(store)) is not None:
             reflected_light = lights_visible_in_mirrors(
                 geometry, mirror_lights.mirrors, points, mirror_lights.direction
             )
             arrays[f"views/{k}/mirror_lights"], num_rays = reflected_light.visible, num_rays + reflected_light.num_rays
-        return TaskOutput(arrays, num_rays, sum(hits.trace_s for hits in material_hits))
+        return TaskOutput(arrays, num_rays, trace_s)
 
 
 def num_patches(recipe: Recipe) -> int:

@@ -5,6 +5,8 @@ R(x) = Σ_r w_r L_r q(x, ω_r) Π_f curve_f(angle_f(x, ω_r)),   w_r = cos θi /
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
@@ -50,7 +52,7 @@ class RayProjector:
         weights, rows = sharing.weights_and_neighbors(self._term, start, stop)
         radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)
         self._add(rays.unshared(rows), self._receivers.without_light(rows), 0, len(rows), radiance)
-        out += (weights @ radiance.reshape(len(rows), -1)).reshape(out.shape)
+        out += (weights @ radiance.reshape(len(rows), math.prod(out.shape[1:]))).reshape(out.shape)
 
     def _add(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int, out: F32) -> None:
         c = self._contraction

@@ -193,7 +193,8 @@ class MapOverrideStore:
         if name in _PERTURBED_COLUMNS:
             values[:] = getattr(self._perturbed[first], name)[rows]
         elif name == "gather_hits":
-            values[:] = self._gather_hits(first)[rows]
+            gather_hits = self._gather_hits(first)[rows]
+            values[:, : gather_hits.shape[1]] = gather_hits
         elif name in _TRACED_COLUMNS:
             self._trace(name, first, self._all_rows(first)[rows], values)
 
@@ -227,9 +228,9 @@ class MapOverrideStore:
     def _trace(self, name: str, first: int, rows: RowIndices, values: NDArray[Any]) -> None:
         """Trace rays of some samples of a material. values: baked values; overwritten"""
         if name == "gather_hits":
-            values[:] = self._tracer.gather_hits(
-                self._surface_points(first, rows), self._wo(first, rows), self._pattern(first)
-            )
+            pattern = self._pattern(first)
+            traced_hits = self._tracer.gather_hits(self._surface_points(first, rows), self._wo(first, rows), pattern)
+            values[:, : pattern.num_rays] = traced_hits
             return
         surface_points = self._surface_points(first, rows)
         if name == "visibility":

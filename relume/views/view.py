@@ -254,14 +254,16 @@ class View:
 
     def subset_rays(self, material: int, sample_indices: Shaped[NDArray[np.integer], " k"]) -> GatherRays:
         """Read gather rays of some of a material's samples, unfiltered and without light. See `read_rows`."""
-        gather_hits = np.asarray(self.read_rows("gather_hits", material, sample_indices), np.uint16)
-        return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), no_light())
+        pattern = make_material_pattern(self.store, self.index, material)
+        gather_hits = self.read_rows("gather_hits", material, sample_indices)[:, : pattern.num_rays]
+        return GatherRays(np.ascontiguousarray(gather_hits, np.uint16), pattern, no_light())
 
     def gather_rays(self, material: int) -> GatherRays:
         """Read the gather rays of a material's samples without light, with the filter between neighbors."""
         rows = self.rows(material)
-        gather_hits = self.store.read(f"views/{self.index}/gather_hits", rows.start, rows.stop)
         pattern = make_material_pattern(self.store, self.index, material)
+        stored_hits = self.store.read(f"views/{self.index}/gather_hits", rows.start, rows.stop)
+        gather_hits = np.ascontiguousarray(stored_hits[:, : pattern.num_rays])  # others may have more rays
         return GatherRays(gather_hits, pattern, no_light(), self._neighbor_filter(material, gather_hits, pattern))
 
     def mirror_lights(self, material: int) -> Shaped[NDArray[np.uint8], "n bytes"]:

@@ -36,7 +36,7 @@ _SIZE, _SMALL_SIZE, _BLOCK_SIZE = (64, 48), (32, 24), 8
 _MAX_VIEWS = 3
 _TURNTABLE_STEPS = 18  # of a full turn: as far as one drag rotates a camera
 _BUDGET_BYTES = 1 << 30
-_DIGITS = 4
+_DIGITS = 3
 _UNKNOWN = BakedError(*[JackknifeEstimate(np.nan, np.nan)] * 2)
 
 

@@ -43,8 +43,7 @@ from relume.store.bake_protocol import Recipe, Task
 from relume.views.sample_seeds import make_seeds
 from relume.views.view import View, open_view
 
-# a fifth of a bake's rays, both lattices of Fibonacci size; their light is shared with more neighbors
-_RAYS, _GLOSSY_RAYS = 123, 34
+_RAYS, _GLOSSY_RAYS, _DIFFUSE_RAYS = 123, 34, 89  # a third or less of a bake's; lattices of Fibonacci sizes
 _ROWS_PER_TASK = 4096  # at most half a second of work, which bounds the time to cancel
 _SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the stage between these is in the bake
 _LIGHT_FRACTION = 0.3  # of the progress of a view with edited glass; the rest is the view
@@ -196,7 +195,7 @@ class StaticViewBuilder:
     def __init__(self, light_transport: BakedFixedViews, scene: Scene) -> None:
         self._light_transport, self._scene = light_transport, scene
         self._smooth, self._sparse = (
-            GatherMethod(_RAYS, _GLOSSY_RAYS, smooths_edges=smooths_edges)
+            GatherMethod(_RAYS, _GLOSSY_RAYS, _DIFFUSE_RAYS, smooths_edges=smooths_edges)
             if isinstance(light_transport, BakedIndirectViews)
             else DirectMethod(smooths_edges=smooths_edges)
             for smooths_edges in (True, False)
