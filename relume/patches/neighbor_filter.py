@@ -6,12 +6,13 @@ The weights depend only on geometry, so that the mean is linear in lights and ma
 
 Irradiance changes between points a and b by a share of at most about
 
-    ε(a, b) = ‖x_a − x_b‖ / R + √(2 − 2 n_a · n_b) ,
+    ε(a, b) = ‖x_a − x_b‖ / R + s √(2 − 2 n_a · n_b) ,   s = 1 ,
 
 where R is the harmonic mean of the distances to the surfaces around them (irradiance caching: Ward, Rubinstein and
 Clear, "A Ray Tracing Solution for Diffuse Interreflection", 1988). A neighbor has the weight of a tent over pixels
 times 1 − ε / ε_max: means are narrow at contacts and where a surface bends, and wide elsewhere. A mirror reflection
-turns by twice the change of the normal, so highlights have a smaller ε_max (docs/adr/0036-interleaved-gather-rays.md).
+turns by twice the change of the normal, and highlights are narrow: for them s = 4
+(docs/adr/0036-interleaved-gather-rays.md).
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
 
 _RADIUS = 2  # pixels
-_MAX_CHANGE, _MAX_HIGHLIGHT_CHANGE = np.float32(0.2), np.float32(0.05)  # ε_max
+_MAX_CHANGE = np.float32(0.2)  # ε_max
+_DIFFUSE_TURN, _HIGHLIGHT_TURN = np.float32(1), np.float32(4)  # s
 _MAX_RISE = np.float32(0.2)  # distance of a neighbor from the tangent plane, over its distance from the sample
 
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
@@ -90,8 +92,8 @@ class NeighborFilter:
         values, is_diffuse = np.empty(max_entries, np.float32), term.scatters_diffusely
         points = self.points.position, self.points.normal, self.points.alpha_sample
         member = np.ones(1, np.bool_) if is_diffuse else self.has_highlight
-        max_change = _MAX_CHANGE if is_diffuse else _MAX_HIGHLIGHT_CHANGE
-        args = pixels, points, self.inverse_distance, member, max_change, start, stop
+        turn = _DIFFUSE_TURN if is_diffuse else _HIGHLIGHT_TURN
+        args = pixels, points, self.inverse_distance, member, turn, start, stop
         num = _fill_weights(*args, starts, columns, values)
         return csr_array((values[:num], columns[:num], starts), shape=(stop - start, len(self.pixel)))
 
@@ -129,32 +131,32 @@ def _max_entries(first, pixel, width):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, inline="always")
-def _change(points, inverse_distance, a, b):  # type: ignore[no-untyped-def]
+def _change(points, inverse_distance, turn, a, b):  # type: ignore[no-untyped-def]
     """Return ε of two samples; 2 if they lie on different smooth surfaces.
 
     Args:
-        points: position and normal of each sample, (n, 3) float32, and their alpha samples.
+        points: position and normal of each sample, (n, 3) float32, and their alpha samples. turn: s
     """
     position, normal, alpha_sample = points
-    rise = squared = turn = _ZERO
+    rise = squared = bent = _ZERO
     for axis in range(3):
         offset, bend = position[b, axis] - position[a, axis], normal[b, axis] - normal[a, axis]
         rise += normal[a, axis] * offset
         squared += offset * offset
-        turn += bend * bend
+        bent += bend * bend
     num = alpha_sample.shape[0]
     if rise * rise > _MAX_RISE * _MAX_RISE * squared or alpha_sample[a % num] != alpha_sample[b % num]:
         return _TWO
-    return math.sqrt(squared) * max(inverse_distance[a], inverse_distance[b]) + math.sqrt(turn)
+    return math.sqrt(squared) * max(inverse_distance[a], inverse_distance[b]) + turn * math.sqrt(bent)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
-def _fill_weights(pixels, points, inverse_distance, member, max_change, start, stop, starts, column_index, weights):  # type: ignore[no-untyped-def]
+def _fill_weights(pixels, points, inverse_distance, member, turn, start, stop, starts, column_index, weights):  # type: ignore[no-untyped-def]
     """Compute the weights of samples [start, stop).
 
     Args:
-        pixels: order, first, pixel and width of `NeighborFilter`. points, inverse_distance: as in `_change`.
-        member: samples that share their light, or one for all. max_change: ε_max.
+        pixels: order, first, pixel and width of `NeighborFilter`. points, inverse_distance, turn: as in `_change`.
+        member: samples that share their light, or one for all.
         starts, column_index, weights: rows of the sparse matrix, written. (m + 1,), (≥ entries,) each
     Returns:
         Number of entries.
@@ -172,7 +174,7 @@ def _fill_weights(pixels, points, inverse_distance, member, max_change, start, s
                 tent = np.float32((_RADIUS + 1 - abs(row - y)) * (_RADIUS + 1 - abs(column - x)))
                 for entry in range(run_start, run_stop):
                     b = order[entry]
-                    closeness = _ONE if a == b else _ONE - _change(points, inverse_distance, a, b) / max_change
+                    closeness = _ONE if a == b else _ONE - _change(points, inverse_distance, turn, a, b) / _MAX_CHANGE
                     if closeness > 0 and member[b % num_members]:
                         # the samples of one pixel share its weight
                         column_index[count], weights[count] = b, closeness * tent / np.float32(run_stop - run_start)

@@ -113,14 +113,14 @@ def test_weights_fall_with_distance_and_turn_as_light_may_change():
     normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
     inverse_distance = np.asarray(0.002 * (1 + pixel % WIDTH), np.float32)
 
-    def closeness(a, b, largest):
+    def closeness(a, b, turn):
         near = max(inverse_distance[a], inverse_distance[b])
-        change = near * np.linalg.norm(position[a] - position[b]) + np.linalg.norm(normal[a] - normal[b])
-        return 1 - change / largest
+        change = near * np.linalg.norm(position[a] - position[b]) + turn * np.linalg.norm(normal[a] - normal[b])
+        return 1 - change / 0.2
 
     weights = filter_of(pixel, position, normal, inverse_distance)
-    for model, largest in (("lambert", 0.2), ("ggx", 0.05)):
-        expected = brute_force_weights(pixel, lambda a, b, largest=largest: closeness(a, b, largest))
+    for model, turn in (("lambert", 1), ("ggx", 4)):
+        expected = brute_force_weights(pixel, lambda a, b, turn=turn: closeness(a, b, turn))
         assert 0.01 < np.mean(expected == 0) < 0.9
         np.testing.assert_allclose(all_weights(weights, model), expected, atol=2e-5)
 
