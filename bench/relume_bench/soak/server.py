@@ -100,11 +100,16 @@ class SoakServer:
         return Sample(at_s, resident_bytes(self._process.pid), workers, handles, threads, folder_bytes(self.data))
 
     def children(self) -> list[int]:
-        """Process ids of its descendants."""
+        """Process ids of its descendants, but for Python's tracker of semaphores.
+
+        If that one is killed, its successor reports each semaphore of before as an error when it is released.
+        """
         parents: dict[int, int] = {}
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit():
                 with suppress(OSError, IndexError):
+                    if b"resource_tracker" in (entry / "cmdline").read_bytes():
+                        continue
                     parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
         children, todo = [], [self._process.pid]
         while todo:
