@@ -177,6 +177,7 @@ BOUNDED = {
     "scene_io/usd/value_types.py",
     "store/run_bake.py",
     "transport/outgoing_patch_light.py",
+    "views/sample_seeds.py",
 }
 
 
