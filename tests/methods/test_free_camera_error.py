@@ -37,12 +37,12 @@ def error_of_a_whole_image(transfer, scene):
 
 
 def test_a_bake_stores_the_error_of_its_images(corner, tmp_path):
-    few, many = (baked(corner, tmp_path, num) for num in (80, 1500))
+    few, many = (baked(corner, tmp_path, num) for num in (80, 300))
     for transfer in (few, many):
         for error, whole in zip(transfer.free_camera_error, error_of_a_whole_image(transfer, corner), strict=True):
-            assert 0 <= error.standard_error < 0.5 * error.value  # stored with three digits
-            # a small image also has errors along edges: 0.016 RMS, however many probes there are
-            assert 0.7 * error.value < whole < 2.5 * error.value
+            assert 0 < error.standard_error < 0.5 * error.value
+            # a small image also has errors along edges
+            assert 0.7 * error.value < whole < 2 * error.value
     for coarse, fine in zip(few.free_camera_error, many.free_camera_error, strict=True):
         assert coarse.value > 1.5 * fine.value
 
