@@ -111,6 +111,16 @@ def frame_of_camera(session: Session, number: int) -> Frame:
     return frame
 
 
+def moving_frame(session: Session, message: dict[str, Any], revision: int = 0) -> Frame:
+    """The frame of a moving camera when light at its probes is complete; no static view changes it."""
+    session.send_message(**message, refine="none")
+    frame = frame_of_camera(session, message["seq"])
+    while frame.header["fidelity"] == "preview" or frame.header["revision"] < revision:
+        frame = session.frame()
+    assert (frame.header["camera_seq"], frame.header["fidelity"]) == (message["seq"], "approximate")
+    return frame
+
+
 def test_hello_describes_the_free_camera_and_the_scene_bounds(session: Session) -> None:
     first_view = hello(session)
     (view,) = first_view["views"]
@@ -126,18 +136,12 @@ def test_frames_follow_the_camera_and_name_its_sequence_number(session: Session)
     (view,) = hello(session)["views"]
     first = session.frame()
     assert (first.header["camera_seq"], first.header["exact"]) == (None, False)
-    while first.header["fidelity"] == "preview":  # light at the probes is computed in the background
-        first = session.frame()
-    assert first.header["fidelity"] == "approximate"
-    pictures = [shown(first)]
-    for number, aside in ((5, 0.4), (6, -0.3)):
-        session.send_message(**camera_message(view, number, aside))
-        pictures.append(shown(frame_of_camera(session, number)))
+    places = ((4, 0.2), (5, 0.4), (6, -0.3), (7, 0.2))
+    pictures = [shown(moving_frame(session, camera_message(view, number, aside))) for number, aside in places]
     assert all(picture.max() > 0.01 for picture in pictures)
-    for k in range(3):
+    for k in range(1, 4):
         assert np.abs(pictures[k] - pictures[k - 1]).max() > 0.01
-    session.send_message(**camera_message(view, 7, 0.0))
-    np.testing.assert_array_equal(shown(frame_of_camera(session, 7)), pictures[0])
+    np.testing.assert_array_equal(pictures[3], pictures[0])
 
 
 def exact_of(session: Session, number: int, revision: int) -> Frame:
@@ -171,12 +175,11 @@ def test_static_view_follows_when_the_camera_stops_and_edits_continue_in_it(
 
 def test_outdated_camera_is_ignored_and_frames_have_the_camera_size(session: Session) -> None:
     (view,) = hello(session)["views"]
-    session.send_message(**camera_message(view, 9, 0.2, (40, 30)))
-    frame = frame_of_camera(session, 9)
+    frame = moving_frame(session, camera_message(view, 9, 0.2, (40, 30)))
     assert (frame.header["width"], frame.header["height"], frame.header["tiles"]) == (40, 30, [[0, 0, 40, 30]])
     session.send_message(**camera_message(view, 8, 0.5))
-    session.send_message(**camera_message(view, 10, 0.2, (40, 30)))
-    np.testing.assert_array_equal(shown(frame_of_camera(session, 10)), shown(frame))
+    after = moving_frame(session, camera_message(view, 10, 0.2, (40, 30)))
+    np.testing.assert_array_equal(shown(after), shown(frame))
 
 
 def test_burst_of_edit_light_and_camera_is_shown_completely(session: Session, client: TestClient, bake: str) -> None:
@@ -186,20 +189,14 @@ def test_burst_of_edit_light_and_camera_is_shown_completely(session: Session, cl
     terms = [{"model": "lambert", "color": [0.1, 0.5, 0.2]}]
     session.edit(1, f"/materials/{material}/terms", terms)
     session.edit(2, "/environment/intensity", 2.0)
-    session.send_message(**camera_message(view, 3, 0.3))
-    frame = frame_of_camera(session, 3)
-    while frame.header["revision"] < 2:
-        frame = session.frame()
-    burst = shown(frame)
+    burst = shown(moving_frame(session, camera_message(view, 3, 0.3), revision=2))
     with open_session(client, bake) as other:
         hello(other)
-        other.send_message(**camera_message(view, 1, 0.3))
+        other.send_message(**camera_message(view, 1, 0.3), refine="none")
         other.edit(1, f"/materials/{material}/terms", terms)
         other.edit(2, "/environment/intensity", 2.0)
-        frame = other.frame()
-        while (frame.header["revision"], frame.header["camera_seq"]) != (2, 1):
-            frame = other.frame()
-        np.testing.assert_array_equal(shown(frame), burst)
+        after = moving_frame(other, camera_message(view, 2, 0.3), revision=2)
+        np.testing.assert_array_equal(shown(after), burst)
 
 
 def test_render_equals_the_first_frame(client: TestClient, bake: str, session: Session, tmp_path: Any) -> None:
