@@ -85,7 +85,7 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
         if kind == _AGX:
             for c in range(3):
                 out[k, c] = agx_curve(AGX_INSET[c, 0] * rgb[0] + AGX_INSET[c, 1] * rgb[1] + AGX_INSET[c, 2] * rgb[2])
-            rgb[:] = out[k]
+            rgb[0], rgb[1], rgb[2] = out[k, 0], out[k, 1], out[k, 2]
             for c in range(3):
                 v = AGX_OUTSET[c, 0] * rgb[0] + AGX_OUTSET[c, 1] * rgb[1] + AGX_OUTSET[c, 2] * rgb[2]
                 out[k, c] = min(max(v, _ZERO), _ONE)

@@ -26,6 +26,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.light_axes import light_axes, unit_direction
 from relume.lights.light_sampling import (
     EmitterParts,
@@ -302,8 +303,8 @@ def _table_lookup(table, axes, scale, along, dx, dy, dz):  # type: ignore[no-unt
     return low + s * (high - low)
 
 
-# inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
-@nb.njit(nogil=True, cache=True, inline="always")
+# counting references to all arrays of the light, which threads share, would take 13 times as long
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
     """Evaluate a sample of a light at a point.
 

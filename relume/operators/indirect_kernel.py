@@ -90,7 +90,8 @@ def transform(patches, sums, num_levels, index, details):  # type: ignore[no-unt
             end += 1
         num = at
     index[end] = 0
-    details[end] = sums[0]
+    for s in range(sums.shape[1]):
+        details[end, s] = sums[0, s]
     return end + 1
 
 
@@ -110,7 +111,7 @@ def select_coefficients(index, details, expected, coefficients, scale, rows):  #
             squared_norm += details[m, s] * details[m, s]
         importance[m] = squared_norm * expected[index[m]] ** 2
     num_dropped = index.shape[0] - coefficients.shape[0]
-    threshold = np.partition(importance, num_dropped)[num_dropped] if num_dropped > 0 else np.float32(0)
+    threshold = np.sort(importance)[num_dropped] if num_dropped > 0 else np.float32(0)
     slot = 0
     # from coarse to fine: of equally important coefficients the finest are omitted
     for m in range(index.shape[0] - 1, -1, -1):

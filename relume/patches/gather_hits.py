@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
-from relume.patches.patch_kdtree import NO_PATCH_NODE, PatchTree, locate
+from relume.patches.patch_kdtree import NO_PATCH, NO_PATCH_NODE, PatchTree, locate
 from relume.raytrace.gather_rays import RayPattern, cosine_ray, glossy_ray, lattice_offsets
 from relume.raytrace.ray_packet import (
     LANES,
@@ -31,6 +31,7 @@ from relume.raytrace.surface_points import SurfacePoints
 
 F32 = NDArray[np.float32]
 
+_MAX_HEIGHT = np.float32(2)  # of an origin above its own triangle, in offsets: the offset and as much rounding
 _POINTS_PER_RANGE = 256
 _MAX_COHERENT_TRIANGLES = 20_000  # rays of neighboring points traverse trees of more triangles faster one by one
 
@@ -40,7 +41,8 @@ class GatherHits:
     """Hits of the gather rays of n points.
 
     Attributes:
-        patch: index of the patch that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
+        patch: index of the patch that each ray hits, `NO_PATCH` if it leaves the scene, goes into its own triangle
+            (see `_hits_own_face`) or was not traced.
         num_rays: number of traced rays. trace_s: wall time of the tracing alone.
     """
 
@@ -93,6 +95,26 @@ def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore
     return num_valid
 
 
+@nb.njit(nogil=True, cache=True, fastmath=True, forceinline=True, **NO_REFCOUNT)
+def _hits_own_face(packet, lane, normals, offset):  # type: ignore[no-untyped-def]
+    """Whether a ray hits the triangle on which it starts.
+
+    A direction above a smooth normal may lie below the plane of the triangle: the solid blocks it, as it blocks shadow
+    rays, and diffuse light must not come from the triangle itself. Glossy and lobe rays do bring its light: it stands
+    for further reflections, without which bumps in metal would be black.
+
+    Args:
+        packet: traced rays. lane: of the ray. normals: of the faces. offset: of ray origins on the faces, meters.
+    """
+    face, distance = get_hit(packet, lane)
+    if face < 0:
+        return False
+    facing = np.float32(0)
+    for axis in range(3):
+        facing += normals[face, axis] * get_direction(packet, lane, axis)
+    return abs(facing) * distance <= _MAX_HEIGHT * offset[face]
+
+
 @nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def find_sides(packet, surfaces, roots, keys, nodes):  # type: ignore[no-untyped-def]
     """Find the side of a mesh that the ray of each lane hits.
@@ -102,7 +124,7 @@ def find_sides(packet, surfaces, roots, keys, nodes):  # type: ignore[no-untyped
         keys: position and normal of each hit, written. (6, `LANES`) float32
         nodes: root of each side, `NO_PATCH_NODE` for no hit, written. (`LANES`,) int32
     """
-    normals, sides = surfaces[0], surfaces[1]
+    normals, sides = surfaces
     for k in range(LANES):
         nodes[k] = NO_PATCH_NODE
         face, _ = get_hit(packet, k)
@@ -124,9 +146,9 @@ def find_sides(packet, surfaces, roots, keys, nodes):  # type: ignore[no-untyped
 def _trace(tracer, points, wo, surfaces, tree, pattern, start, stop, gather_hits):  # type: ignore[no-untyped-def]
     """Trace all rays of points [start, stop), the same ray of `LANES` points at once; return their number.
 
-    surfaces: normal, and index of the front side, of each face.
+    surfaces: normal, index of the front side, and offset of ray origins of each face.
     """
-    packet = new_packet(tracer)
+    packet, (normals, sides, offset) = new_packet(tracer), surfaces
     frame, local_wo = np.empty((3, 3, LANES), np.float32), np.empty((3, LANES), np.float32)
     offsets, keys = np.empty((2, 4, LANES), np.float32), np.zeros((6, LANES), np.float32)
     patches = np.empty(LANES, np.int32)
@@ -137,10 +159,11 @@ def _trace(tracer, points, wo, surfaces, tree, pattern, start, stop, gather_hits
         for ray in range(gather_hits.shape[1]):
             num_rays += _aim(pattern, ray, frame, local_wo, offsets, packet, width)
             trace_hits(packet)
-            find_sides(packet, surfaces, tree.roots, keys, patches)
+            find_sides(packet, (normals, sides), tree.roots, keys, patches)
             locate(tree, keys, patches)
             for k in range(width):
-                gather_hits[first + k, ray] = patches[k]
+                is_own = ray < pattern.num_cosine and _hits_own_face(packet, k, normals, offset)
+                gather_hits[first + k, ray] = NO_PATCH if is_own else patches[k]
     return num_rays
 
 
@@ -156,7 +179,7 @@ def trace_gather_rays(
         pattern: ray directions of every point.
     """
     gather_hits = np.empty((points.num_points, pattern.num_rays), np.uint16)
-    surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32)
+    surfaces = geometry.face_normals, (2 * geometry.face_mesh).astype(np.int32), geometry.origins.offset
     tracer = geometry.embree.hit_tracer(coherent=len(geometry.faces) <= _MAX_COHERENT_TRIANGLES)
     args = tracer, points, wo, surfaces, tree, pattern
     counts: list[int] = []

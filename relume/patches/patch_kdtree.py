@@ -100,7 +100,11 @@ def _split(keys, reach, rows):  # type: ignore[no-untyped-def]
     if extent[axis] <= 0:
         return -1, 0, np.float32(0)
     order = np.argsort(keys[:, axis].copy(), kind="mergesort")
-    rows[:], keys[:], reach[:] = rows[order], keys[order], reach[order]
+    sorted_rows, sorted_keys, sorted_reach = rows[order], keys[order], reach[order]
+    for row in range(len(rows)):
+        rows[row], reach[row] = sorted_rows[row], sorted_reach[row]
+        for k in range(6):
+            keys[row, k] = sorted_keys[row, k]
     values = keys[:, axis]
     # normals form clusters, which are not cut; positions are split evenly
     num_first = np.searchsorted(values, np.float32(0.5) * (low[axis] + high[axis])) if axis >= 3 else _find_gap(values)

@@ -110,7 +110,7 @@ def inner_barycentrics(mesh, face, u, v):  # type: ignore[no-untyped-def]
     return a / total, b / total, c / total
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def ray_origin(mesh, face, u, v, side):  # type: ignore[no-untyped-def]
     """Position of a ray's origin on a triangle, three numbers, meters.
 

@@ -138,7 +138,8 @@ def _trace(packet, block, origins, directions, lights, samples):  # type: ignore
 def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
     """Find the lights above each sample's horizon. Returns the number of pairs."""
     by_axis = np.zeros((3, BLOCK), np.float32)  # missing samples face no light
-    by_axis[:, : normals.shape[0]] = normals.T
+    for k in range(normals.shape[0]):
+        by_axis[0, k], by_axis[1, k], by_axis[2, k] = normals[k, 0], normals[k, 1], normals[k, 2]
     nx, ny, nz = by_axis[0], by_axis[1], by_axis[2]
     is_above = np.empty(BLOCK, np.uint8)
     bytes_as_words = is_above.view(np.uint64)

@@ -268,7 +268,7 @@ def texels_at(textured, texture):  # type: ignore[no-untyped-def]
     return diffuse, specular
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def isotropic_at(textured, patch, texels):  # type: ignore[no-untyped-def]
     """Isotropic radiance of a patch at a point of it.
 
@@ -302,7 +302,7 @@ def _add_directional(textured, patch, channel, texels, directional):  # type: ig
     return even + max(highlight + specular * textured.per_specular[patch, channel] * directional, least)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def from_patch(outgoing, textured, patch, texels, world):  # type: ignore[no-untyped-def]
     """Radiance of a patch at a point of it.
 

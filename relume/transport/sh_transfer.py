@@ -86,7 +86,9 @@ def _transfer(recurrence_table, normal, tangent, visible, direction, values, sta
                 np.dot(functions, weighted_harmonics, product)
                 total += product
                 num_pending = 0
-        out[p] = total[:, :NUM_HARMONICS]
+        for k in range(total.shape[0]):
+            for harmonic in range(NUM_HARMONICS):
+                out[p, k, harmonic] = total[k, harmonic]
 
 
 class ClusteredTransfer(NamedTuple):

@@ -12,6 +12,7 @@ from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.importons import lobe_directions
 from relume.patches.patch_kdtree import NO_PATCH, grow_tree, locate
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches, patch_sample_points
+from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern
 from relume.raytrace.ray_packet import LANES
@@ -233,14 +234,35 @@ def test_results_do_not_depend_on_order_and_batches(box):
 
 
 def test_no_ray_leaves_a_closed_room():
-    """Rays of patches and of a viewer inside a ball: an escaping ray would lose light."""
-    ball = sphere("room", (0, 0, 0), 2.0, 0, num_rings=24, inside=True)
+    """Rays of patches inside a ball: an escaping ray would lose light, as do the few below their triangles."""
+    ball = sphere("room", (0, 0, 0), 2.0, 0, num_rings=96, inside=True)
     room = make_tiny_scene(ball, camera=make_camera("front", (0, 0, 1), (0, 0, 0), 1.0))
     geometry = build_scene_buffers(room)
     patches = choose_patches(room, geometry, ("front",), (64, 64), 500)
     points = points_of(patches, 400)
     links = trace_gather_rays(geometry, patches.tree, points, points.normal, make_pattern(64, 0, 1))
     assert np.mean(links.patch == NO_PATCH) < 1e-4
+
+
+@pytest.mark.parametrize(("center", "radius"), [((0, 0, 0), 1.0), ((0, 0, 0), 1e-3), ((50, 3, -20), 0.01)], ids=str)
+def test_convex_solid_does_not_light_itself(center, radius):
+    """Up to a hundredth of the rays above smooth normals of a coarse ball are below the planes of its triangles."""
+    ball = sphere("ball", center, radius, 0, num_rings=6)
+    eye = np.add(center, (0, 0, 4 * radius))
+    scene = make_tiny_scene(ball, camera=make_camera("front", eye, center, 1.0))
+    geometry, rng = build_scene_buffers(scene), np.random.default_rng(3)
+    patches = choose_patches(scene, geometry, ("front",), (64, 64), 100)
+    num = 4000
+    face = rng.choice(len(geometry.faces), num, p=geometry.face_areas / geometry.face_areas.sum())
+    root, v = np.sqrt(rng.random(num)), rng.random(num)
+    uv = np.stack([root * (1 - v), root * v], axis=1).astype(np.float32)
+    weights = np.column_stack([1 - uv.sum(axis=1), uv])
+    normal = np.einsum("nk,nkc->nc", weights, geometry.normals[geometry.faces[face]])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    position = positions_on_faces(geometry, face, uv, geometry.face_normals[face])
+    points = make_surface_points(position, normal)
+    links = trace_gather_rays(geometry, patches.tree, points, points.normal, make_pattern(64, 0, 1))
+    assert np.mean(links.patch != NO_PATCH) < 1e-4
 
 
 def test_patches_have_tangents_of_uv_coordinates():

@@ -221,7 +221,7 @@ def _add_bright_lights(tracer, points, wo, footprint, pattern, widths, environme
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for lane in range(width):
-            mirrored[lane] = mirror_direction(points, first + lane, wo)
+            mirrored[lane, 0], mirrored[lane, 1], mirrored[lane, 2] = mirror_direction(points, first + lane, wo)
             spread[lane] = half_vector_spread(footprint, first + lane)
         for k in range(lights.shape[0]):
             d, radius, num_lit = (lights[k, 0], lights[k, 1], lights[k, 2]), disk_radius(lights[k, 6]), 0
