@@ -102,8 +102,9 @@ def _compile_pictures(has_shared: Event) -> None:
     with _rare_collections(), _temporary_scene() as (scene, folder):
         try:
             transfer = _bake_and_open(METHODS["direct"], scene, folder)
-            _polish(transfer, _picture(transfer))
-            _move_lights(transfer, _picture(transfer))
+            _polish(transfer, _picture(transfer), _POLISHED_ROUGHNESS)
+            _drag_roughness(transfer, _picture(transfer))
+            _move_lights(transfer, _picture(transfer), ("point", "spot", "directional", "rectangle"))
         finally:
             has_shared.set()
         _apply_btf(transfer, _picture(transfer), folder)
@@ -119,11 +120,11 @@ def _compile_rays(has_shared: Event) -> None:
         transfer = _bake_and_open(METHODS["probes"], scene, folder)
         _move_cameras(transfer, FreeCameraPicture(transfer, VIEW, is_watched=True))
         has_shared.wait()
-        _polish(transfer, FreeCameraPicture(transfer, VIEW))
+        _polish(transfer, FreeCameraPicture(transfer, VIEW), _POLISHED_ROUGHNESS)
         _apply_btf(transfer, FreeCameraPicture(transfer, VIEW), folder)
         transfer = _bake_and_open(METHODS["gather"], scene, folder)
-        _polish(transfer, _picture(transfer))
-        _move_lights(transfer, _picture(transfer))
+        _polish(transfer, _picture(transfer), _POLISHED_ROUGHNESS)
+        _move_lights(transfer, _picture(transfer), ("point",))
         _apply_btf(transfer, _picture(transfer), folder)
         _edit(transfer, _picture(transfer), RAY_MODELS)
 
@@ -171,23 +172,35 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
         apply(table, np.zeros((1, 3), np.float32))
 
 
-def _polish(transfer: FixedViewTransfer | BakedFreeCamera, picture: Picture | FreeCameraPicture) -> None:
-    """Trace along the lobes of polished metals that see each other, and drag their width."""
-    for roughness in _POLISHED_ROUGHNESS:
+def _polish(
+    transfer: FixedViewTransfer | BakedFreeCamera,
+    picture: Picture | FreeCameraPicture,
+    roughnesses: Iterable[float],
+) -> None:
+    """Trace along the lobes of polished metals that see each other."""
+    for roughness in roughnesses:
         terms = [{"model": "ggx", "params": {"roughness": roughness, "f0": 0.9}, "texture": None}]
         partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
         picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
         picture.advance(None)
         if isinstance(picture, Picture):
             _render(picture)
-            picture.prepare(f"/materials/{transfer.material_names[0]}/terms/0/params/roughness")
-            _render(picture)
 
 
-def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:
+def _drag_roughness(transfer: FixedViewTransfer, picture: Picture) -> None:
+    """Drag the width of the lobes of one polished metal among dark surfaces."""
+    polished, *others = transfer.material_names
+    terms = [{"model": "ggx", "params": {"roughness": 0.1, "f0": 0.9}, "texture": None}]
+    partial = {"materials": {polished: {"terms": terms}, **{name: {"terms": []} for name in others}}}
+    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    picture.prepare(f"/materials/{polished}/terms/0/params/roughness")
+    _render(picture)
+
+
+def _move_lights(transfer: FixedViewTransfer, picture: Picture, kinds: Iterable[str]) -> None:
     """Add a light of each kind in sequence and move each twice while it is prepared; one material is enough."""
     dark: dict[str, Any] = {name: {"terms": []} for name in transfer.material_names[1:]}
-    for kind in ("point", "spot", "directional", "rectangle"):
+    for kind in kinds:
         picture.prepare("/lights/Lamp")
         for height in (1.0, 1.1, 1.2):
             geometry = {} if kind == "directional" else {"position": [0.0, height, 0.5]}
