@@ -108,8 +108,7 @@ def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 def _is_crowded(pool: str) -> bool:
     """True if every core already computes a frame."""
-    num_frames = len(_frame_threads)
-    return pool == _FRAME and num_frames >= 2 and num_frames >= num_threads()
+    return pool == _FRAME and len(_frame_threads) >= 2 and len(_frame_threads) >= num_threads()
 
 
 def _run(kernel: Kernel, count: int, grain: int) -> None:

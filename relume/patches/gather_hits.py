@@ -97,7 +97,7 @@ def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore
 
 @nb.njit(nogil=True, cache=True, fastmath=True, forceinline=True, **NO_REFCOUNT)
 def _hits_own_face(packet, lane, normals, offset):  # type: ignore[no-untyped-def]
-    """Whether a ray hits the triangle on which it starts.
+    """Return whether a ray hits the triangle on which it starts.
 
     A direction above a smooth normal may lie below the plane of the triangle: the solid blocks it, as it blocks shadow
     rays, and diffuse light must not come from the triangle itself. Glossy and lobe rays do bring its light: it stands

@@ -9,13 +9,14 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.errors import ChunkDamagedError, ParameterError, SceneError, StoreError
+from relume.core.errors import ParameterError, SceneError, StoreError
 from relume.raytrace.gather_rays import RayPattern, make_pattern
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.scene.lens import read_lens
 from relume.scene.model import Camera
 from relume.scene.validate import check_camera
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import read_optional
 
 F32 = NDArray[np.float32]
 
@@ -88,16 +89,6 @@ def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> Shaped[NDAr
     return np.arange(start, stop, dtype=np.uint32)
 
 
-def read_patch_position(store: StoreReader) -> Shaped[F32, "patches points 3"] | None:
-    """Read the sample points of patches; None for a method without patches."""
-    try:
-        return np.asarray(store.read("patches/position"), np.float32)
-    except ChunkDamagedError:
-        raise
-    except StoreError:
-        return None
-
-
 def read_surface_points(
     store: StoreReader, k: int, start: int, stop: int, seed: Shaped[NDArray[np.uint32], " n"]
 ) -> SurfacePoints:
@@ -152,11 +143,7 @@ def read_uv(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n
     Returns:
         None if the store has none
     """
-    try:
-        store.shape(f"views/{k}/uv")
-    except StoreError:
-        return None
-    return np.asarray(store.read(f"views/{k}/uv", start, stop), np.float32)
+    return read_optional(store, f"views/{k}/uv", start, stop)
 
 
 def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, " n"]:
@@ -165,12 +152,8 @@ def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> Sha
     Args:
         store: an open store. k: index of the view. start, stop: rows of its arrays.
     """
-    try:
-        return np.asarray(store.read(f"views/{k}/normal_length", start, stop), np.float32)
-    except ChunkDamagedError:
-        raise
-    except StoreError:
-        return np.ones(stop - start, np.float32)
+    length = read_optional(store, f"views/{k}/normal_length", start, stop)
+    return np.ones(stop - start, np.float32) if length is None else length
 
 
 def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, material: int) -> Shaped[F32, "n 3"] | None:
@@ -182,13 +165,9 @@ def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, mater
     shortest_lengths = store.attributes.get("shortest_normals")
     if shortest_lengths is None:
         return None
-    try:
-        return np.asarray(store.read(f"views/{k}/surface_normal", start, stop), np.float32)
-    except ChunkDamagedError:
-        raise
-    except StoreError:
-        has_normal_map = shortest_lengths[material] < 1
-        return None if has_normal_map else np.asarray(store.read(f"views/{k}/normal", start, stop), np.float32)
+    names = ("surface_normal",) if shortest_lengths[material] < 1 else ("surface_normal", "normal")
+    normals = (read_optional(store, f"views/{k}/{name}", start, stop) for name in names)
+    return next((normal for normal in normals if normal is not None), None)
 
 
 def read_shortest_normals(store: StoreReader) -> list[float]:

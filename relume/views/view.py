@@ -27,6 +27,7 @@ from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.texture import sample_image
 from relume.scene.model import Camera
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import read_optional
 from relume.transport.outgoing_patch_light import no_light
 from relume.transport.shading_points import GatherRays, ShadingPoints
 from relume.views.frost_filter import REACH, FrostFilter, make_frost_filter
@@ -37,7 +38,6 @@ from relume.views.store_io import (
     make_material_pattern,
     read_camera,
     read_level_pairs,
-    read_patch_position,
     read_ray_origins,
     read_roughness_levels,
     read_rows_by_block,
@@ -290,7 +290,7 @@ class View:
         self, material: int, gather_hits: Shaped[NDArray[np.uint16], "n rays"], pattern: RayPattern
     ) -> NeighborFilter:
         def build_filter() -> NeighborFilter:
-            points, patch_position = self.surface_points(material), read_patch_position(self.store)
+            points, patch_position = self.surface_points(material), read_optional(self.store, "patches/position")
             if patch_position is None:  # not known: the filter depends on normals alone
                 inverse_distance = np.zeros(points.num_points, np.float32)
             else:

@@ -248,8 +248,8 @@ def test_no_ray_leaves_a_closed_room():
 def test_convex_solid_does_not_light_itself(center, radius):
     """Up to a hundredth of the rays above smooth normals of a coarse ball are below the planes of its triangles."""
     ball = sphere("ball", center, radius, 0, num_rings=6)
-    eye = np.add(center, (0, 0, 4 * radius))
-    scene = make_tiny_scene(ball, camera=make_camera("front", eye, center, 1.0))
+    viewpoint = np.add(center, (0, 0, 4 * radius))
+    scene = make_tiny_scene(ball, camera=make_camera("front", viewpoint, center, 1.0))
     geometry, rng = build_scene_buffers(scene), np.random.default_rng(3)
     patches = choose_patches(scene, geometry, ("front",), (64, 64), 100)
     num = 4000

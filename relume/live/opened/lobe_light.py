@@ -20,7 +20,6 @@ from relume.assets.environments.equirect import (
 from relume.brdf.albedo import Documents, Reflectance, Reflectances, directional_albedo, quantized_reflectance
 from relume.brdf.lobe_sampling import LobeSampling, lobe_of
 from relume.brdf.texture_slots import TEXTURES, EmissionImage
-from relume.core.errors import ChunkDamagedError, StoreError
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.protocols import LightQuality
@@ -40,6 +39,7 @@ from relume.raytrace.surface_textures import (
     transform_coordinates,
 )
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import read_optional
 from relume.transport.hit_textures import NO_TEXTURES, HitTextures, hit_textures, row_of_slot, textured_light
 from relume.transport.lobe_hits import LobeHits, trace_lobe_rays
 from relume.transport.lobe_paths import LobeSurfaces, edge_curvature
@@ -195,14 +195,10 @@ class LobeTracer:
     @cached_property
     def _textures(self) -> tuple[Textures, TextureCoordinates] | None:
         """Textures as baked, and their coordinates; None for a store without them."""
-        geometry = self._tracer.geometry
-        try:
-            uvs, textures = self._store.read("scene/uvs"), read_textures(self._store)
-        except ChunkDamagedError:
-            raise
-        except StoreError:
+        geometry, uvs = self._tracer.geometry, read_optional(self._store, "scene/uvs")
+        if uvs is None:
             return None
-        return textures, texture_coordinates(uvs, geometry.positions, geometry.faces)
+        return read_textures(self._store), texture_coordinates(uvs, geometry.positions, geometry.faces)
 
     @cached_property
     def _glass(self) -> Shaped[F32, "materials 4"]:
@@ -219,12 +215,8 @@ class LobeTracer:
     @cached_property
     def normals(self) -> F32:
         """Normals of the corners; empty for a store that lacks them."""
-        try:
-            return np.asarray(self._store.read("scene/normals"), np.float32)
-        except ChunkDamagedError:
-            raise
-        except StoreError:
-            return np.empty((0, 3), np.float32)
+        normals = read_optional(self._store, "scene/normals")
+        return np.empty((0, 3), np.float32) if normals is None else normals.astype(np.float32)
 
     @cached_property
     def _curvature(self) -> Shaped[F32, " faces"]:
@@ -238,13 +230,12 @@ class LobeTracer:
     def _lookup(self) -> PatchLookup:
         geometry = self._tracer.geometry
         sides = (2 * geometry.face_mesh).astype(np.int32)
-        try:
-            tree, reach = read_tree(self._store), patch_reach(self._store.read("patches/position"))
-        except ChunkDamagedError:
-            raise
-        except StoreError:  # direct light alone
-            tree, reach = _no_patches(int(sides.max(initial=0)) + 2), patch_reach(np.empty((0, 1, 3), np.float32))
-        return PatchLookup(tree, geometry.face_normals, sides, reach)
+        position = read_optional(self._store, "patches/position")
+        if position is None:  # direct light alone
+            tree, position = _no_patches(int(sides.max(initial=0)) + 2), np.empty((0, 1, 3), np.float32)
+        else:
+            tree = read_tree(self._store)
+        return PatchLookup(tree, geometry.face_normals, sides, patch_reach(position))
 
 
 def _padded(rows: Sequence[F32]) -> F32:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relume.assets.ies.ies_store import load_web
 from relume.brdf.texture_slots import EmissionImage
 from relume.core.cache import Cache
-from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.errors import StoreError
 from relume.images.image_store import load_gobo, load_texture
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import (
@@ -42,6 +42,7 @@ from relume.raytrace.scene_buffers import is_front
 from relume.raytrace.source_surfaces import SourceSurfaces
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import read_optional
 from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
@@ -330,12 +331,10 @@ class LocalLights:
         return self._cache.get_value((self._key, "emission image", material, image), compute)
 
     def _read_uvs(self) -> Shaped[F32, "vertices 2"]:
-        try:
-            return np.asarray(self._store.read("scene/uvs"), np.float32)
-        except ChunkDamagedError:
-            raise
-        except StoreError:
-            raise StoreError("this bake is too old for emission images; bake the scene again") from None
+        uvs = read_optional(self._store, "scene/uvs")
+        if uvs is None:
+            raise StoreError("this bake is too old for emission images; bake the scene again")
+        return uvs
 
     def _emissive_faces(self, material: str) -> tuple[int, Shaped[NDArray[np.bool_], " triangles"]]:
         """Return the index of a material, and which triangles have it."""

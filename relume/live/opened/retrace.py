@@ -9,7 +9,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.planar_mirrors import lights_visible_in_mirrors
-from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.errors import StoreError
 from relume.live.opened.local_lights import LocalLights
 from relume.methods.mirror_lights import MirrorLights
 from relume.methods.patch_layout import read_tree
@@ -21,6 +21,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.visibility import above_horizon, trace_visibility
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import read_optional
 
 F32 = NDArray[np.float32]
 
@@ -84,11 +85,8 @@ class NormalRetracer:
     def geometry(self) -> SceneBuffers:
         """Triangles for rays between surfaces: without normals and textures."""
         store, positions, faces = self._store, self._local.positions, self._local.faces
-        try:
-            mesh, material = (store.read(f"scene/{name}") for name in ("face_mesh", "face_material"))
-        except ChunkDamagedError:
-            raise
-        except StoreError:
-            raise StoreError("this bake is too old to show normal map overrides; bake the scene again") from None
+        mesh, material = (read_optional(store, f"scene/{name}") for name in ("face_mesh", "face_material"))
+        if mesh is None or material is None:
+            raise StoreError("this bake is too old to show normal map overrides; bake the scene again")
         normals, tangents, uvs = (np.empty((0, k), np.float32) for k in (3, 4, 2))
         return SceneBuffers(positions, normals, tangents, uvs, faces, material, mesh, self._local.embree)

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import TEXTURES
-from relume.core.errors import StoreError
 from relume.methods.patch_layout import read_patch_points
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.raytrace.gather_rays import make_pattern
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import read_optional
 
 F32 = NDArray[np.float32]
 
@@ -27,15 +27,6 @@ def read_patches(store: StoreReader) -> PatchLight:
         make_pattern(gather_hits.shape[1] // points_per_patch, 0, int(store.attributes["gather_seed"])),
         material,
         np.stack([store.read(f"patches/{texture}") for texture in TEXTURES]),
-        _read_optional(store, "patches/uv"),
-        _read_optional(store, "patches/surface_normal"),
+        read_optional(store, "patches/uv"),
+        read_optional(store, "patches/surface_normal"),
     )
-
-
-def _read_optional(store: StoreReader, path: str) -> F32 | None:
-    """Read an array that stores of earlier versions lack; None for those."""
-    try:
-        store.shape(path)
-    except StoreError:
-        return None
-    return np.asarray(store.read(path), np.float32)
