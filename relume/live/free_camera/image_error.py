@@ -22,7 +22,7 @@ F64 = NDArray[np.float64]
 
 
 class PixelErrors(NamedTuple):
-    """Terms of the error, of each pixel; zero without a surface. (height, width) each
+    """Terms of the error, of each compared pixel; zero without a surface. (height, width) each
 
     Attributes:
         delta_e: CIEDE2000 difference. squared_error, squared_radiance: sums over channels.
@@ -45,15 +45,17 @@ def pixel_errors(
     exact: Shaped[F32, "height width 3"],
     gbuffer: GBuffer,
     display: DisplayLook,
+    step: int = 1,
 ) -> PixelErrors:
     """Compare a free-camera image with the exact one.
 
     Args:
         image, exact: linear radiance. gbuffer: of the image; its first rays go through pixel centers.
-        display: conversion to display values.
+        display: conversion to display values. step: compare each step-th pixel of each step-th row.
     """
     height, width = image.shape[:2]
-    is_surface = gbuffer.shows_surface(width * height).reshape(height, width).astype(np.float64)
+    is_surface = gbuffer.shows_surface(width * height).reshape(height, width)[::step, ::step].astype(np.float64)
+    image, exact = image[::step, ::step], exact[::step, ::step]
     displayed, exact_displayed = (to_display(each, display.transform) for each in (image, exact))
     reference = exact.astype(np.float64)
     return PixelErrors(
