@@ -12,8 +12,9 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from typing import ParamSpec, TypeVar
 
@@ -106,16 +107,16 @@ def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         _frame_threads.remove(threading.get_ident())
 
 
-def _is_crowded(pool: str) -> bool:
-    """True if every core already computes a frame."""
-    return pool == _FRAME and len(_frame_threads) >= 2 and len(_frame_threads) >= num_threads()
+def _must_run_here(pool: str) -> bool:
+    """True in a pool's thread, which would wait for itself, and if every core already computes a frame."""
+    is_crowded = pool == _FRAME and len(_frame_threads) >= 2 and len(_frame_threads) >= num_threads()
+    return is_crowded or getattr(_thread_state, "is_of_pool", False)
 
 
 def _run(kernel: Kernel, count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
-    # a pool thread that waits for its own pool would deadlock
     name = getattr(_thread_state, "pool", _FRAME)
-    if num_threads() == 1 or len(ranges) == 1 or getattr(_thread_state, "is_of_pool", False) or _is_crowded(name):
+    if num_threads() == 1 or len(ranges) == 1 or _must_run_here(name):
         for start, stop in ranges:
             kernel(start, stop)
         return
@@ -194,23 +195,31 @@ def parallel_for_cancellable(
     for_ranges(step, count, grain)
 
 
-def map_ordered(work: Callable[[Item], T], items: Sequence[Item], max_concurrent: int) -> Iterator[T]:
+def map_ordered(work: Callable[[Item], T], items: Sequence[Item], max_concurrent: int) -> Generator[T, None, None]:
     """Call `work` with each item, several at once, and yield the results in the order of the items.
+
+    While the caller uses a result, threads compute the next ones. All calls have ended when the iterator is closed.
 
     Args:
         work: called from several threads. items: independent of each other.
         max_concurrent: maximum number of results in memory.
     """
-    step = min(max_concurrent, num_threads())
-    for first in range(0, len(items), step):
-        batch = items[first : first + step]
-        results = dict[int, T]()
-
-        def run_range(start: int, stop: int, batch: Sequence[Item] = batch, results: dict[int, T] = results) -> None:
-            results.update({k: work(batch[k]) for k in range(start, stop)})
-
-        for_ranges(run_range, len(batch), 1)
-        yield from (results[k] for k in range(len(batch)))
+    name = getattr(_thread_state, "pool", _FRAME)
+    if min(max_concurrent, num_threads()) == 1 or _must_run_here(name):
+        yield from map(work, items)
+        return
+    futures = deque[Future[T]]()
+    try:
+        for item in items:
+            if len(futures) == max_concurrent:
+                yield futures.popleft().result()
+            futures.append(_pool(name).submit(work, item))
+        while futures:
+            yield futures.popleft().result()
+    finally:
+        for future in futures:
+            future.cancel()
+        wait(futures)
 
 
 def parallel_for_chunks(kernel: Kernel, count: int, chunks_per_thread: int = _CHUNKS_PER_THREAD) -> None:

@@ -26,7 +26,6 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.light_axes import light_axes, unit_direction
 from relume.lights.light_sampling import (
     EmitterParts,
@@ -303,8 +302,9 @@ def _table_lookup(table, axes, scale, along, dx, dy, dz):  # type: ignore[no-unt
     return low + s * (high - low)
 
 
-# counting references to all arrays of the light, which threads share, would take 13 times as long
-@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
+# inlined by Numba: LLVM rounds its sums differently in each kernel, and irradiance of a moving light must equal that of
+# a resting one
+@nb.njit(nogil=True, cache=True, inline="always")
 def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
     """Evaluate a sample of a light at a point.
 

@@ -30,11 +30,12 @@ from numpy.typing import NDArray
 from relume.core.errors import PlanError
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.methods import plan_estimates
+from relume.methods.baked_error import FREE_CAMERA_ERROR
 from relume.methods.mirror_lights import make_mirror_lights
 from relume.methods.patch_layout import read_patch_points, read_tree
 from relume.methods.read_cache import ReadCache
 from relume.methods.spherical_harmonic_transfer import harmonic_bytes, make_harmonic_light
-from relume.methods.store_layout import FREE_CAMERA_ERROR, array_of_rows
+from relume.methods.store_layout import array_of_rows
 from relume.methods.view_stages import SampledViews, light_arrays, read_targets, triangle_arrays
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patches import POINTS_PER_PATCH, choose_patches

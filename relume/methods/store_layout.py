@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import math
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.core.jackknife import JackknifeEstimate
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.raytrace.alpha_filter import AlphaTest
@@ -24,7 +22,6 @@ F32 = NDArray[np.float32]
 
 SHARD_ROWS = 16_384
 _CHUNK_BYTES, _MIN_CHUNK_ROWS = 1 << 20, 1024
-FREE_CAMERA_ERROR = "error/free_camera"
 
 
 def array_of_rows(path: str, shape: tuple[int, ...], dtype: str, shard_rows: int = SHARD_ROWS) -> ArraySpec:
@@ -102,27 +99,6 @@ def read_alpha_test(
     ):
         raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that is not in the scene")
     return AlphaTest.build(faces, positions, uvs, material, alpha_masks)
-
-
-class BakedError(NamedTuple):
-    """Error of free-camera images, estimated by a bake in the scene's default look.
-
-    Attributes:
-        delta_e, rms: as in `relume.live.fixed_camera.fidelity.ImageError`.
-    """
-
-    delta_e: JackknifeEstimate
-    rms: JackknifeEstimate
-
-
-def read_free_camera_error(store: StoreReader) -> BakedError | None:
-    """Read the error of free-camera images; None if unknown, as for bakes of earlier versions."""
-    if not store.attributes.get("has_free_camera_error") or store.shape(FREE_CAMERA_ERROR) != (2, 2):
-        return None
-    estimates = store.read(FREE_CAMERA_ERROR)
-    if not np.isfinite(estimates).all():
-        return None
-    return BakedError(*(JackknifeEstimate(*row) for row in estimates.tolist()))
 
 
 def read_rays(store: StoreReader) -> RayCounts:

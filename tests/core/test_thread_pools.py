@@ -3,11 +3,19 @@
 import os
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from relume.core.thread_pools import for_ranges, low_priority, mark_background_thread, parallel_for_chunks, run_frame
+from relume.core.thread_pools import (
+    for_ranges,
+    low_priority,
+    map_ordered,
+    mark_background_thread,
+    parallel_for_chunks,
+    run_frame,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -133,3 +141,47 @@ def test_frames_have_priority():
         assert min(niceness()) > of_frames or of_frames == 19  # 19 is the maximum
     with ThreadPoolExecutor(1, initializer=mark_background_thread) as long:
         assert min(long.submit(niceness).result()) > of_frames or of_frames == 19
+
+
+def test_ordered_results_are_computed_ahead_but_no_more_than_allowed():
+    started = []
+
+    def square(k):
+        started.append(k)
+        time.sleep(0.01 if k % 2 == 0 else 0)  # even ones end after the next odd one
+        return k * k
+
+    results = map_ordered(square, range(20), 2)
+    for k, result in enumerate(results):
+        assert result == k * k
+        assert len(started) <= k + 3  # two ahead of the result in use
+    assert sorted(started) == list(range(20))
+    assert list(map_ordered(square, range(5), 1)) == [0, 1, 4, 9, 16]
+    assert list(map_ordered(square, [], 4)) == []
+
+
+def test_no_work_goes_on_after_an_ordered_map_has_failed_or_is_closed():
+    running = []
+
+    def work(k):
+        running.append(k)
+        time.sleep(0.02)
+        running.remove(k)
+        if k == 3:
+            raise ValueError("three")
+        return k
+
+    results = map_ordered(work, range(50), 2)
+    with pytest.raises(ValueError, match="three"):
+        list(results)
+    assert running == []
+    results = map_ordered(work, range(50), 2)
+    assert next(results) == 0
+    results.close()
+    assert running == []
+
+
+def test_ordered_maps_inside_of_kernels_do_not_wait_for_themselves():
+    sums = []
+    for_ranges(lambda start, stop: sums.append(sum(map_ordered(lambda k: k, range(start, stop), 2))), 100, 10)
+    assert sum(sums) == sum(range(100))

@@ -26,7 +26,7 @@ from relume.live.free_camera.image_error import PixelErrors, pixel_errors
 from relume.live.free_camera.static_view_jobs import StaticViewState
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.static_view import StaticViewBuilder
-from relume.methods.store_layout import BakedError
+from relume.methods.baked_error import BakedError
 from relume.scene.model import Camera, Scene
 from relume.store.bake_protocol import StoreReader
 

@@ -36,8 +36,8 @@ from relume.look.glass import GlassOfLook
 from relume.look.model import Link
 from relume.look.object_materials import ObjectMaterials
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
+from relume.methods.baked_error import BakedError, read_free_camera_error
 from relume.methods.mirror_lights import read_mirror_lights
-from relume.methods.store_layout import BakedError, read_free_camera_error
 from relume.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
 from relume.probes.triangle_grids import num_nodes
 from relume.raytrace.embree import EmbreeScene
