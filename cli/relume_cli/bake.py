@@ -188,7 +188,7 @@ def _report_rays(store: Path) -> None:
 
 
 def _report_free_camera_error(store: Path) -> None:
-    from relume.methods.store_layout import read_free_camera_error
+    from relume.methods.baked_error import read_free_camera_error
     from relume.store.reader import open_store
 
     free_camera_error = read_free_camera_error(open_store(store))
