@@ -10,8 +10,9 @@ from relume.core.errors import CancelledError, ResultUnavailableError
 from relume.live.free_camera.frame import render_frame
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.progressive_picture import ProgressivePicture
+from relume.live.opened.extended_store import ExtendedStore
 from relume.live.opened.openers import open_bake, open_transfer
-from relume.live.opened.static_view import StaticTracing, StaticViewBuilder
+from relume.live.opened.static_view import StaticViewBuilder
 from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.custom_camera import with_cameras
@@ -153,7 +154,7 @@ def test_static_view_of_an_earlier_camera_is_discarded(picture, free_bake):
 
 
 def test_static_view_reports_progress_and_resumes(picture, monkeypatch):
-    monkeypatch.setattr("relume.live.opened.static_view._ROWS_PER_TASK", 512)
+    monkeypatch.setattr("relume.live.opened.static_view._ROWS_PER_TASK", 64)  # many more tasks than run at once
     run_next_job(picture)  # the correction, for which shadow rays are traced
     job, shares = picture.next_job(), []
     with pytest.raises(CancelledError):
@@ -283,13 +284,13 @@ def test_a_correction_is_valid_for_one_look_and_camera(corrected, free_bake, is_
 @pytest.fixture
 def traced_stages(monkeypatch):
     """The traced stages: shadows and gather rays."""
-    stages, trace = [], StaticTracing._trace
+    stages, write = [], ExtendedStore.write
 
-    def record(tracing, task):
+    def record(store, task, output):
         stages.append(task.stage)
-        trace(tracing, task)
+        write(store, task, output)
 
-    monkeypatch.setattr(StaticTracing, "_trace", record)
+    monkeypatch.setattr(ExtendedStore, "write", record)
     return stages
 
 
