@@ -102,7 +102,7 @@ def _compile_pictures(has_shared: Event) -> None:
     with _rare_collections(), _temporary_scene() as (scene, folder):
         try:
             transfer = _bake_and_open(METHODS["direct"], scene, folder)
-            _polish(transfer, _picture(transfer), _POLISHED_ROUGHNESS)
+            _polish(transfer, _picture(transfer))
             _drag_roughness(transfer, _picture(transfer))
             _move_lights(transfer, _picture(transfer), ("point", "spot", "directional", "rectangle"))
         finally:
@@ -120,10 +120,10 @@ def _compile_rays(has_shared: Event) -> None:
         transfer = _bake_and_open(METHODS["probes"], scene, folder)
         _move_cameras(transfer, FreeCameraPicture(transfer, VIEW, is_watched=True))
         has_shared.wait()
-        _polish(transfer, FreeCameraPicture(transfer, VIEW), _POLISHED_ROUGHNESS)
+        _polish(transfer, FreeCameraPicture(transfer, VIEW))
         _apply_btf(transfer, FreeCameraPicture(transfer, VIEW), folder)
         transfer = _bake_and_open(METHODS["gather"], scene, folder)
-        _polish(transfer, _picture(transfer), _POLISHED_ROUGHNESS)
+        _polish(transfer, _picture(transfer))
         _move_lights(transfer, _picture(transfer), ("point",))
         _apply_btf(transfer, _picture(transfer), folder)
         _edit(transfer, _picture(transfer), RAY_MODELS)
@@ -156,7 +156,7 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
     material = transfer.material_names[0]
     for term in map(TERMS.__getitem__, models):
         partial = {"materials": {material: {"terms": [{"model": term.model}]}}}
-        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+        _set_look(transfer, picture, partial)
         _render(picture)
         for curve in term.curves:
             picture.prepare(f"/materials/{material}/terms/0/curves/{curve.name}")
@@ -172,16 +172,10 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
         apply(table, np.zeros((1, 3), np.float32))
 
 
-def _polish(
-    transfer: FixedViewTransfer | BakedFreeCamera,
-    picture: Picture | FreeCameraPicture,
-    roughnesses: Iterable[float],
-) -> None:
+def _polish(transfer: FixedViewTransfer | BakedFreeCamera, picture: Picture | FreeCameraPicture) -> None:
     """Trace along the lobes of polished metals that see each other."""
-    for roughness in roughnesses:
-        terms = [{"model": "ggx", "params": {"roughness": roughness, "f0": 0.9}, "texture": None}]
-        partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
-        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    for roughness in _POLISHED_ROUGHNESS:
+        _set_look(transfer, picture, {"materials": dict.fromkeys(transfer.material_names, _metal(roughness))})
         picture.advance(None)
         if isinstance(picture, Picture):
             _render(picture)
@@ -190,11 +184,22 @@ def _polish(
 def _drag_roughness(transfer: FixedViewTransfer, picture: Picture) -> None:
     """Drag the width of the lobes of one polished metal among dark surfaces."""
     polished, *others = transfer.material_names
-    terms = [{"model": "ggx", "params": {"roughness": 0.1, "f0": 0.9}, "texture": None}]
-    partial = {"materials": {polished: {"terms": terms}, **{name: {"terms": []} for name in others}}}
-    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    dark: dict[str, Any] = {name: {"terms": []} for name in others}
+    _set_look(transfer, picture, {"materials": {polished: _metal(_POLISHED_ROUGHNESS[0]), **dark}})
     picture.prepare(f"/materials/{polished}/terms/0/params/roughness")
     _render(picture)
+
+
+def _metal(roughness: float) -> dict[str, Any]:
+    """A polished metal, as a material of a look."""
+    return {"terms": [{"model": "ggx", "params": {"roughness": roughness, "f0": 0.9}, "texture": None}]}
+
+
+def _set_look(
+    transfer: FixedViewTransfer | BakedFreeCamera, picture: Picture | FreeCameraPicture, partial: dict[str, Any]
+) -> None:
+    """Set the default look with some changes."""
+    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
 
 
 def _move_lights(transfer: FixedViewTransfer, picture: Picture, kinds: Iterable[str]) -> None:
@@ -205,7 +210,7 @@ def _move_lights(transfer: FixedViewTransfer, picture: Picture, kinds: Iterable[
         for height in (1.0, 1.1, 1.2):
             geometry = {} if kind == "directional" else {"position": [0.0, height, 0.5]}
             partial = {"materials": dark, "lights": {"Lamp": {"kind": kind, "intensity": height, **geometry}}}
-            picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+            _set_look(transfer, picture, partial)
             _render(picture)
 
 
@@ -215,7 +220,7 @@ def _move_cameras(transfer: BakedFreeCamera, picture: FreeCameraPicture) -> None
     The light gradient for normal maps is computed explicitly, because the scene has no normal maps.
     """
     partial = {"lights": {"Lamp": {"kind": "point", "position": [0.0, 1.0, 0.5]}}}
-    picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+    _set_look(transfer, picture, partial)
     picture.advance(None)
     picture.advance(None)
     picture.set_camera(picture.sized_camera[0], LARGER_SIZE)
@@ -244,7 +249,7 @@ def _apply_btf(transfer: Any, picture: Picture | FreeCameraPicture, folder: Path
         terms = store_btf(folder / "btfs", source, "Grey", None, lambda: gray).terms()
         _sample_btf(complete_term(("warm",), terms[0], None))
         partial = {"materials": {name: {"terms": terms} for name in transfer.material_names}}
-        picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
+        _set_look(transfer, picture, partial)
         if isinstance(picture, Picture):
             _render(picture)
         else:

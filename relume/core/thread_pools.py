@@ -107,16 +107,22 @@ def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         _frame_threads.remove(threading.get_ident())
 
 
-def _must_run_here(pool: str) -> bool:
-    """True in a pool's thread, which would wait for itself, and if every core already computes a frame."""
+def _shared_pool() -> str | None:
+    """Return the pool that shares this thread's work; None if it must work alone.
+
+    A pool's thread would wait for itself, and splitting is in vain while every core already computes a frame.
+    """
+    if getattr(_thread_state, "is_of_pool", False) or num_threads() == 1:
+        return None
+    pool: str = getattr(_thread_state, "pool", _FRAME)
     is_crowded = pool == _FRAME and len(_frame_threads) >= 2 and len(_frame_threads) >= num_threads()
-    return is_crowded or getattr(_thread_state, "is_of_pool", False)
+    return None if is_crowded else pool
 
 
 def _run(kernel: Kernel, count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
-    name = getattr(_thread_state, "pool", _FRAME)
-    if num_threads() == 1 or len(ranges) == 1 or _must_run_here(name):
+    name = _shared_pool()
+    if name is None or len(ranges) == 1:
         for start, stop in ranges:
             kernel(start, stop)
         return
@@ -204,8 +210,8 @@ def map_ordered(work: Callable[[Item], T], items: Sequence[Item], max_concurrent
         work: called from several threads. items: independent of each other.
         max_concurrent: maximum number of results in memory.
     """
-    name = getattr(_thread_state, "pool", _FRAME)
-    if min(max_concurrent, num_threads()) == 1 or _must_run_here(name):
+    name = _shared_pool()
+    if name is None or max_concurrent == 1:
         yield from map(work, items)
         return
     futures = deque[Future[T]]()

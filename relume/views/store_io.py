@@ -165,9 +165,10 @@ def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, mater
     shortest_lengths = store.attributes.get("shortest_normals")
     if shortest_lengths is None:
         return None
-    names = ("surface_normal",) if shortest_lengths[material] < 1 else ("surface_normal", "normal")
-    normals = (read_optional(store, f"views/{k}/{name}", start, stop) for name in names)
-    return next((normal for normal in normals if normal is not None), None)
+    normal = read_optional(store, f"views/{k}/surface_normal", start, stop)
+    if normal is None and shortest_lengths[material] >= 1:  # no normal map
+        return store.read(f"views/{k}/normal", start, stop)
+    return normal
 
 
 def read_shortest_normals(store: StoreReader) -> list[float]:
