@@ -202,9 +202,9 @@ def _store_hits(packet, lanes, ray, first, width, surfaces, hits):  # type: igno
 def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, pattern, first, width, hits, paths, end):  # type: ignore[no-untyped-def]
     """Trace all rays of points [first, first + width), the same ray of all at once.
 
-    Every fourth ray comes first. If all of these, of all points, escape, all others are taken to escape too: an
-    occluder between them covers a small part of the lobes. If none escapes, and it does not matter what they meet, all
-    others are taken not to escape.
+    Every fourth ray comes first. If all of these above the horizon, of all points, escape, all others are taken to
+    escape too: an occluder between them covers a small part of the lobes. If none escapes, and it does not matter what
+    they meet, all others are taken not to escape.
 
     Args:
         packet, lanes: memory. aim: shift and level of each lane, and `_is_lit`.
@@ -216,20 +216,23 @@ def _trace_packet(packet, lanes, aim, points, wo, footprint, lookup, surfaces, p
     has_glass = surfaces.glass.shape[0] > 0
     follows = surfaces.quantile.shape[0] > 0 or has_glass
     _load_points(points, first, width, packet)
-    num_probes, num_escaping = width * ((num_rays + _PROBING - 1) // _PROBING), 0
+    num_probes = num_escaping = 0  # of the rays above their horizons
     for begin in range(_PROBING):
-        if begin == 1 and num_rays >= _FEW_PROBES:
+        if begin == 1 and num_rays >= _FEW_PROBES and num_probes > 0:
             if num_escaping == num_probes:
                 hits[1][first : first + width] = 255
             if num_escaping == num_probes or (num_escaping == 0 and not is_lit):
                 break
         for ray in range(begin, num_rays, _PROBING):
-            if _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet) == 0:
+            num_valid = _aim(pattern, ray, points, wo, footprint, levels, shifts, first, width, has_glass, packet)
+            if num_valid == 0:
                 continue
+            num_probes += num_valid if begin == 0 else 0
             trace_hits(packet)
-            for k in range(LANES):
-                lanes.distance[k] = 0
-            look_up_hits(packet, ray, lookup, surfaces, lanes)
+            if is_lit:
+                for k in range(LANES):
+                    lanes.distance[k] = 0
+                look_up_hits(packet, ray, lookup, surfaces, lanes)
             num_escaping += _store_hits(packet, lanes, ray, first, width, surfaces, hits)
             if follows:
                 before = end
@@ -263,6 +266,7 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
     packet, lanes, end = new_packet(tracer), allocate_lanes(), np.int64(0)
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
     is_lit = _is_lit(lookup, surfaces)
+    lanes.patches[:] = NO_PATCH
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for k in range(LANES):

@@ -52,11 +52,12 @@ from relume.transport.shading_points import GatherRays, ShadingPoints
 F32 = NDArray[np.float32]
 
 _ALBEDO_STEPS = 64
-_PEAK, _MAX_PEAKS, _MAX_SHARED = 8, 32, 256  # brightness of peaks by the mean, and their number
+_PEAK, _MAX_PEAKS = 8, 32  # brightness of peaks by the mean, and their number
+_BRIGHT = 2  # radiance by the mean of triangles that share their light with rays
 _MAX_LOBES, _LEAST_ALBEDO = 255, 0.15  # of the materials from which rays go on
 _WIDE = np.radians(1.0)  # median of a lobe behind which texels are averaged
 _BLUR = 1.5  # of the environment behind a second lobe, by the median of its half angle
-_PREVIEW_RAYS, _NARROW_RAYS, _LOBE_RAYS = 34, 144, 233  # of a sample, Fibonacci numbers
+_PREVIEW_RAYS, _NARROW_RAYS, _LOBE_RAYS = 34, 89, 144  # of a sample, Fibonacci numbers
 
 
 class HitImages(NamedTuple):
@@ -369,12 +370,11 @@ def choose_peaks(
 def bright_triangles(lights: TriangleLights) -> NDArray[np.intp]:
     """Return the triangles of an environment whose light is shared between them and lobe rays, ascending.
 
-    All other light comes along rays. The sum is the light in any case: this decides where its noise is least.
+    All other light comes along rays. The sum is the light in any case: this decides where its noise is least. However
+    small a bright triangle is, the few rays at the foot of a lobe that meet it alone would be white dots.
     """
     power = lights.irradiance.sum(axis=1)
-    radiance = power / np.maximum(lights.solid_angle, 1e-12)
-    bright = np.flatnonzero(radiance > _PEAK * power.sum() / (4 * np.pi))
-    return np.sort(bright[np.argsort(-power[bright], kind="stable")[:_MAX_SHARED]])
+    return np.flatnonzero(power / np.maximum(lights.solid_angle, 1e-12) > _BRIGHT * power.sum() / (4 * np.pi))
 
 
 def lobe_environment(
