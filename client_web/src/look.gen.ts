@@ -347,6 +347,7 @@ export const BASIS_FUNCTIONS = [1, 3, 6, 10, 15, 21, 28, 36];
 export const MAX_LIGHTS = 64;
 export const MAX_LIGHT_GROUPS = 64;
 export const MAX_LIGHT_NAME = 80;
+export const RESERVED_LIGHT_NAMES = ["environment", "__proto__"];
 export const MAX_CURVE_POINTS = 4096;
 export const MAX_CURVE_VALUE = 1000000;
 export const MAX_OPERATIONS = 256;

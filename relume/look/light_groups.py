@@ -19,9 +19,9 @@ from relume.core.validation import (
     check_triple,
     invalid_value,
 )
-from relume.look.light_validation import LIGHT_RANGES
+from relume.look.light_validation import LIGHT_RANGES, check_light_name
 from relume.scene.model import Light
-from relume.scene.validate import MAX_LIGHT_NAME, MAX_LIGHTS
+from relume.scene.validate import MAX_LIGHTS
 
 MAX_LIGHT_GROUPS = MAX_LIGHTS
 DEFAULT_GROUP: dict[str, Any] = {"lights": [], "intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True}
@@ -78,9 +78,7 @@ def _complete_group(name: str, partial: Any, default: Mapping[str, Any] | None, 
     if partial is default or partial is previous:
         return partial
     pointer: Pointer = ("light_groups", name)
-    if not 1 <= len(name) <= MAX_LIGHT_NAME:
-        value = Description(f"a name of {len(name)} characters")
-        raise invalid_value(pointer, value, f"a name of 1 to {MAX_LIGHT_NAME} characters")
+    check_light_name(pointer, name)
     base = DEFAULT_GROUP if default is None else default
     check_object(pointer, partial, base)
     group = {**base, **partial}

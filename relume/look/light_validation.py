@@ -20,7 +20,15 @@ from relume.core.validation import (
 from relume.look.link_validation import check_link
 from relume.scene.light_members import MEMBER_KINDS
 from relume.scene.model import Light
-from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS, MAX_SUN_ANGLE, RADIUS_RANGE
+from relume.scene.validate import (
+    ENVIRONMENT,
+    MAX_EMISSION,
+    MAX_LIGHT_NAME,
+    MAX_LIGHTS,
+    MAX_METERS,
+    MAX_SUN_ANGLE,
+    RADIUS_RANGE,
+)
 
 MAX_INTENSITY = 1e4
 MAX_GOBO_CONE = 85.0  # degrees: at 90 its image would be infinite
@@ -39,6 +47,7 @@ LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; m
     "cone": (0.0, 90.0),
 }
 
+RESERVED_LIGHT_NAMES = (ENVIRONMENT, "__proto__")  # JavaScript does not keep the latter as a name
 _WHITE = (1.0, 1.0, 1.0)
 _COMMON_DEFAULTS: dict[str, Any] = {
     "intensity": 1.0,
@@ -140,12 +149,19 @@ def _complete_light(name: str, lights: Mapping[str, Any], default: Any, previous
     if partial is default or partial is previous:
         return partial
     pointer: Pointer = ("lights", name)
-    if not 1 <= len(name) <= MAX_LIGHT_NAME:
-        value = Description(f"a name of {len(name)} characters")
-        raise invalid_value(pointer, value, f"a name of 1 to {MAX_LIGHT_NAME} characters")
+    check_light_name(pointer, name)
     if not isinstance(partial, Mapping):
         raise invalid_value(pointer, partial, "an object")
     return _merge(pointer, partial, _base_fields(pointer, partial, default))
+
+
+def check_light_name(pointer: Pointer, name: str) -> None:
+    """Require a name that a light or a light group may have. Raises ParameterError."""
+    if not 1 <= len(name) <= MAX_LIGHT_NAME:
+        value = Description(f"a name of {len(name)} characters")
+        raise invalid_value(pointer, value, f"a name of 1 to {MAX_LIGHT_NAME} characters")
+    if name in RESERVED_LIGHT_NAMES:
+        raise invalid_value(pointer, name, "another name: this one is reserved")
 
 
 def _base_fields(pointer: Pointer, partial: Mapping[str, Any], default: Mapping[str, Any] | None) -> Mapping[str, Any]:

@@ -17,7 +17,7 @@ from relume.scene.light_prefix import name_prefix
 from relume.scene.merge_lights import merge_lights, surface_area
 from relume.scene.model import Light, Material, Mesh
 from relume.scene.unique_names import unique_name
-from relume.scene.validate import MAX_EMISSION, MAX_LIGHTS
+from relume.scene.validate import ENVIRONMENT, MAX_EMISSION, MAX_LIGHTS
 
 F64 = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class LightCollector:
 
     def __init__(self, warnings: list[ImporterWarning]) -> None:
         self._warnings = warnings
-        self._names: dict[str, int] = {}
+        self._names = {ENVIRONMENT: 1}
         self._instance_groups: dict[int, str] = {}
         self.lights: list[Light] = []
 

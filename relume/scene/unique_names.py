@@ -8,6 +8,7 @@ from relume.core.import_warnings import UNREADABLE
 def unique_name(preferred: str, used_names: dict[str, int]) -> str:
     """Return a unique name of at most 80 characters, without characters special to JSON pointers or terminals."""
     plain = UNREADABLE.sub("", preferred[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
+    plain = plain.replace("__proto__", "proto")  # what JavaScript does not keep as a name
     return append_number(plain or "unnamed", " ", used_names)
 
 

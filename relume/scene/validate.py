@@ -15,6 +15,8 @@ from relume.scene.model import WRAPS, Camera, Light, Material, Mesh
 MAX_TRIANGLES = 20_000_000
 MAX_MATERIALS = 1_000
 MAX_LIGHTS, MAX_LIGHT_NAME = 64, 80
+ENVIRONMENT = "environment"
+"""Name of the environment among the sources of light; no light has it."""
 MAX_IOR = 4.0
 # of lights, in a scene and in a look: 1000 W are as bright in a scene of 100 km as 0.1 W in a room
 MAX_EMISSION, MAX_METERS = 1e12, 1e9
@@ -113,6 +115,8 @@ def check_lights(lights: Sequence[Light]) -> None:
     names = [light.name for light in lights]
     if len(set(names)) != len(names) or not all(1 <= len(name) <= MAX_LIGHT_NAME for name in names):
         raise SceneError(f"the names of lights must be unique and have 1 to {MAX_LIGHT_NAME} characters; rename them")
+    if ENVIRONMENT in names:
+        raise SceneError(f"a light is named {ENVIRONMENT!r}, as the environment is; rename it")
 
 
 def check_scene(

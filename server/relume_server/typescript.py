@@ -23,7 +23,7 @@ from relume.look import LightLook, Look
 from relume.look.document import DEFAULTS, MAX_TERMS, RANGES
 from relume.look.glass import GLASS_RANGES
 from relume.look.light_groups import MAX_LIGHT_GROUPS
-from relume.look.light_validation import LIGHT_RANGES, default_light
+from relume.look.light_validation import LIGHT_RANGES, RESERVED_LIGHT_NAMES, default_light
 from relume.look.model import BasisFunctions
 from relume.look.patch import MAX_OPERATIONS
 from relume.scene.validate import MAX_LIGHT_NAME, MAX_LIGHTS
@@ -207,6 +207,7 @@ _CONSTANTS = {
     "MAX_LIGHTS": MAX_LIGHTS,
     "MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS,
     "MAX_LIGHT_NAME": MAX_LIGHT_NAME,
+    "RESERVED_LIGHT_NAMES": RESERVED_LIGHT_NAMES,
     "MAX_CURVE_POINTS": MAX_POINTS,
     "MAX_CURVE_VALUE": MAX_CURVE_VALUE,
     "MAX_OPERATIONS": MAX_OPERATIONS,

@@ -83,6 +83,7 @@ def test_an_edit_shares_what_it_does_not_change() -> None:
         ({"A": {"lights": ["Key"]}, "B": {"lights": ["Key"]}}, "it is in 'A'"),
         ({"A": {"lights": ["Key", "Key"]}}, "it is in 'A'"),
         ({"": {"lights": []}}, "a name of 1 to 80 characters"),
+        ({"environment": {"lights": []}}, "this one is reserved"),
         ({str(k): {} for k in range(10_000)}, "10,000 light groups; give at most 64"),
         ({"G": {"lights": [["Key"]]}}, "the name of a light"),
         ({"G": {"lights": "Key"}}, "a list of at most 64 lights"),

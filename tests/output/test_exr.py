@@ -14,6 +14,7 @@ from tiny_scenes import make_camera, still_life
 
 from relume.image_io.exr_writer import image_channels, write_exr
 from relume.look import Look, default_look, validate
+from relume.look.light_validation import RESERVED_LIGHT_NAMES
 from relume.output.exr.export import export_exr
 from relume.output.exr.layers import light_and_path_layers, light_group_layers, make_layers
 from relume.output.exr.metadata import Provenance, build_attributes, world_to_ndc
@@ -118,8 +119,11 @@ def test_a_background_color_has_a_layer_and_shadow_catchers_have_none():
     assert make_layers(False, look, has_indirect=True) == []
 
 
+LIGHT_NAMES = st.text(min_size=1, max_size=80).filter(lambda name: name not in RESERVED_LIGHT_NAMES)
+
+
 def test_lights_with_similar_names_have_distinct_layers():
-    names = ["a.b/c", "a b c", "A-B-C", "灯", "🙂", "environment", "x" * 79, "x" * 80, "../..", "key\nR", "Lampe é"]
+    names = ["a.b/c", "a b c", "A-B-C", "灯", "🙂", "Environment", "x" * 79, "x" * 80, "../..", "key\nR", "Lampe é"]
     layers = light_and_path_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=False)
     assert [layer.source for layer in layers] == ["environment", *names]
     assert names_of(layers)[:6] == [
@@ -128,7 +132,7 @@ def test_lights_with_similar_names_have_distinct_layers():
     assert names_of(layers)[-1] == "light_Lampe_e"
 
 
-@given(st.lists(st.text(min_size=1, max_size=80), min_size=2, max_size=12, unique=True))
+@given(st.lists(LIGHT_NAMES, min_size=2, max_size=12, unique=True))
 def test_layer_names_are_plain_short_and_different(names):
     layers = names_of(light_and_path_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=True))
     assert all(re.fullmatch(r"(light|path)_[A-Za-z0-9_]{1,23}", name) for name in layers)

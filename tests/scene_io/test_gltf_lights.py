@@ -10,8 +10,9 @@ from glb_builder import Glb
 from texture_values import get_texture_values
 
 from relume.assets.environments.environment import Environment
-from relume.core.errors import SceneError
+from relume.core.errors import ParameterError, SceneError
 from relume.look import default_look
+from relume.look.document import complete
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
 from relume.scene_io.import_options import ImportOptions
@@ -54,6 +55,16 @@ def test_punctual_lights_have_the_pose_and_intensity_of_their_node() -> None:
     np.testing.assert_allclose(look["Sun"]["direction"], [0, -1, 0], atol=1e-12)
     assert "position" not in look["Sun"]
     assert len([warning for warning in scene.warnings if "683" in warning]) == 1
+
+
+def test_lights_get_other_names_than_the_environment_and_than_javascript_loses() -> None:
+    lights = [{"type": "point", "name": name} for name in ("environment", "__proto__", "constructor")]
+    scene = imported(with_lights(lights))
+    assert [light.name for light in scene.lights] == ["environment 2", "proto", "constructor"]
+    default = default_look(scene.materials, scene.lights)
+    for name in ("environment", "__proto__"):
+        with pytest.raises(ParameterError, match="reserved"):
+            complete({"lights": {name: {"kind": "point"}}}, default)
 
 
 def test_emission_is_factor_times_strength_times_texture_mean() -> None:

@@ -193,6 +193,17 @@ def test_missing_files_give_a_warning(tmp_path: Path) -> None:
     assert len(warnings) == len(words)
 
 
+@pytest.mark.parametrize(
+    ("line", "names"), [("my mats.mtl", ["my mats.mtl"]), ("a.mtl b.mtl", ["a.mtl", "b.mtl"]), ("mats", ["mats"])]
+)
+def test_a_missing_material_file_is_named_as_it_was_meant(tmp_path: Path, line: str, names: list[str]) -> None:
+    path = tmp_path / "thing.obj"
+    path.write_text(SQUARE + f"mtllib {line}\nf 1 2 3\n")
+    warnings = import_scene(path, "thing", LIGHT).warnings
+    assert len(warnings) == len(names)
+    assert all(name in warning for name, warning in zip(names, warnings, strict=True))
+
+
 def test_an_archive_contains_the_scene_with_its_files() -> None:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -15,10 +15,9 @@ from relume.brdf.albedo import Reflectance, Reflectances, material_reflectance
 from relume.brdf.texture_slots import EmissionImage, NormalMap
 from relume.look import EnvironmentKey, LightGeometry, LightPaths, Look
 from relume.look.model import Link, Rgb
+from relume.scene.validate import ENVIRONMENT
 
 F32 = NDArray[np.float32]
-
-ENVIRONMENT = "environment"  # name of the environment among the names of sources
 
 Solo = frozenset[str] | None
 Normals = tuple[NormalMap | None, ...]

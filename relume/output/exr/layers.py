@@ -13,8 +13,9 @@ from typing import Literal
 
 from relume.look import Look
 from relume.look.model import PathFilter
+from relume.scene.validate import ENVIRONMENT
 
-ENVIRONMENT, BACKGROUND = "environment", "background"
+BACKGROUND = "background"
 _MAX_NAME_LENGTH = 29  # plus ".R", 31 characters, which every OpenEXR reader accepts
 _PATH_KINDS: tuple[PathFilter, ...] = ("direct", "first_bounce", "further_bounces")
 Layering = bool | Literal["light_groups"]

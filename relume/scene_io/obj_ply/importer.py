@@ -330,7 +330,10 @@ def _read_library(companions: Companions, name: str, warnings: list[ImporterWarn
 
 
 def _read_libraries(line: str, companions: Companions, warnings: list[ImporterWarning]) -> list[tuple[str, bytes]]:
-    """The files of one `mtllib`: the whole line is a name that may contain spaces, otherwise each word is one."""
+    """The files of one `mtllib`: the whole line is a name that may contain spaces, otherwise each word is one.
+
+    If none is there, the missing one is the whole line, unless every word ends like a file.
+    """
     whole = line.strip('"').replace("\\ ", " ")
     words = [word.strip('"').replace("\0", " ") for word in line.replace("\\ ", "\0").split()]
     attempts: list[list[ImporterWarning]] = []
@@ -339,5 +342,7 @@ def _read_libraries(line: str, companions: Companions, warnings: list[ImporterWa
         read = [(name, _read_library(companions, name, attempts[-1])) for name in names]
         if any(data is not None for _, data in read):
             break
+    else:
+        attempts = attempts[: None if all(posixpath.splitext(word)[1] for word in words) else 1]
     warnings.extend(attempts[-1])
     return [(name, data) for name, data in read if data is not None]

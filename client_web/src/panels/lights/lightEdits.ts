@@ -2,7 +2,7 @@
 import { batch, computed } from "@preact/signals";
 import { jsonPointer } from "../../state/document/pointer";
 import { editValue, replaceLook } from "../../edit/edit";
-import { MAX_LIGHTS } from "../../look.gen";
+import { MAX_LIGHTS, RESERVED_LIGHT_NAMES } from "../../look.gen";
 import type { Light, Look, Triple } from "../../protocol";
 import { soloLight } from "../../state/visibility/soloSources";
 import { defaultLook, look } from "../../state/look";
@@ -70,7 +70,8 @@ function withRenamedLight(groups: Look["light_groups"], name: string, to: string
 export function renameLight(name: string, to: string): void {
   const current = look.peek();
   if (current === null || !isAddedLight(name) || to === name) return;
-  if (current.lights[to] !== undefined) return showNote(`A light named “${to}” already exists.`);
+  if (RESERVED_LIGHT_NAMES.includes(to)) return showNote(`“${to}” is reserved. Use another name.`);
+  if (Object.hasOwn(current.lights, to)) return showNote(`A light named “${to}” already exists.`);
   const renamed = Object.entries(current.lights).map(([entryName, light]) => [
     entryName === name ? to : entryName,
     light,

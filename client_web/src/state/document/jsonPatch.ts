@@ -1,5 +1,5 @@
 /** Changes of the look: before and after, and the JSON Patches (RFC 6902) in both directions. */
-import { applyPatches, enablePatches, produceWithPatches, type Draft, type Patch } from "immer";
+import { enablePatches, produceWithPatches, type Draft, type Patch } from "immer";
 import type { Look, PatchOp } from "../../protocol";
 import { diffLooks, isDeepEqual } from "./difference";
 import { getAt, jsonPointer, pointerTokens } from "./pointer";
@@ -49,8 +49,27 @@ export function changeValue(look: Look, path: string, value: unknown): LookChang
 
 /** The change made by a patch; several operations on one path are merged. */
 export function changeByPatch(look: Look, patch: readonly PatchOp[]): LookChange {
-  const steps = patch.map(({ op, path, value }) => ({ op, path: pointerTokens(path), value }) as Patch);
-  return makeChange(look, (draft) => void applyPatches(draft, steps));
+  return makeChange(look, (draft) => patch.forEach((operation) => apply(draft, operation)));
+}
+
+/** Apply one operation. Throws for a path that does not exist. Immer's own refuses names like "constructor", which
+ * materials may have. */
+function apply(draft: DraftNode, { op, path, value }: PatchOp): void {
+  const parents = pointerTokens(path);
+  const last = parents.pop();
+  const node = parents.reduce<unknown>((parent, token) => (hasOwn(parent, token) ? parent[token] : undefined), draft);
+  if (last === undefined || typeof node !== "object" || node === null) throw new Error(`No ${path} to ${op}`);
+  if (op !== "add" && !hasOwn(node, last)) throw new Error(`No ${path} to ${op}`);
+  if (Array.isArray(node) && op !== "replace") {
+    const index = last === "-" ? node.length : Number(last);
+    if (op === "add") node.splice(index, 0, structuredClone(value));
+    else node.splice(index, 1);
+  } else if (op === "remove") Reflect.deleteProperty(node, last);
+  else (node as DraftNode)[last] = structuredClone(value);
+}
+
+function hasOwn(node: unknown, key: string): node is DraftNode {
+  return typeof node === "object" && node !== null && Object.hasOwn(node, key);
 }
 
 /** The change to another look. */

@@ -39,7 +39,7 @@ export const groupSource = (group: string) => GROUP_PREFIX + group;
  * by undo. */
 export function lightsOfSource(look: Look, source: string): readonly string[] | null {
   if (source === ENVIRONMENT_SOURCE) return [];
-  if (look.lights[source] !== undefined) return [source];
+  if (Object.hasOwn(look.lights, source)) return [source];
   return source.startsWith(GROUP_PREFIX)
     ? (look.light_groups[source.slice(GROUP_PREFIX.length)]?.lights ?? null)
     : null;
@@ -48,7 +48,7 @@ export function lightsOfSource(look: Look, source: string): readonly string[] | 
 /** A light source as people name it. */
 export function sourceLabel(look: Look, source: string): string {
   if (source === ENVIRONMENT_SOURCE) return "environment";
-  return look.lights[source] === undefined ? source.slice(GROUP_PREFIX.length) : source;
+  return Object.hasOwn(look.lights, source) ? source : source.slice(GROUP_PREFIX.length);
 }
 
 /** Names of the solo sources for the server; null: all. */
