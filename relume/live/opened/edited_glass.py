@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.digest import digest
-from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-from relume.live.opened.extended_store import ExtendedStore, split_tasks
+from relume.live.opened.extended_store import ExtendedStore, split_tasks, write_tasks
 from relume.live.opened.fixed_views import BakedFixedViews
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.stored_patches import read_patches
@@ -100,8 +100,11 @@ def _trace_patches(
     recipe = Recipe(method.name, (), (width, height), store.attributes["num_lights"])
     store.allocate(method.arrays(_RAY_STAGE, scene, recipe, store))
     tasks = list(split_tasks(method.tasks(_RAY_STAGE, scene, recipe, store), _PATCHES_PER_TASK))
-    for k, task in enumerate(tasks):
-        if is_canceled():
-            raise CancelledError("the light through the edited glass was canceled")
-        progress(k / len(tasks))
-        store.write(task, method.compute(scene, recipe, task, store))
+    num_done = count(1)
+    write_tasks(
+        store,
+        tasks,
+        lambda task: method.compute(scene, recipe, task, store),
+        lambda: progress(next(num_done) / len(tasks)),
+        is_canceled,
+    )

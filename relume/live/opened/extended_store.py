@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import IO, Any
 
@@ -11,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError, StoreError
+from relume.core.thread_pools import map_ordered
 from relume.live.fixed_camera.jobs import CancelCheck
 from relume.store.bake_protocol import ArraySpec, StoreReader, Task, TaskOutput
+
+_MAX_RESULTS = 4  # of tasks that wait to be written
 
 
 class ExtendedStore:
@@ -72,3 +76,34 @@ def split_tasks(tasks: Iterable[Task], num_rows: int) -> Iterator[Task]:
     for task in tasks:
         for start in range(task.start, task.stop, num_rows):
             yield replace(task, start=start, stop=min(start + num_rows, task.stop))
+
+
+def write_tasks(
+    store: ExtendedStore,
+    tasks: Sequence[Task],
+    compute: Callable[[Task], TaskOutput],
+    report: Callable[[], None],
+    is_canceled: CancelCheck,
+) -> None:
+    """Compute tasks side by side, each on its thread, and write their results in order.
+
+    Args:
+        store: that is written. tasks: disjoint rows. compute: a task; thread-safe.
+        report: called after each task is written. is_canceled: polled before each is computed, and written.
+    Raises:
+        CancelledError: `is_canceled` returned true.
+    """
+
+    def check() -> None:
+        if is_canceled():
+            raise CancelledError("the tracing was canceled")
+
+    def work(task: Task) -> TaskOutput:
+        check()
+        return compute(task)
+
+    with closing(map_ordered(work, tasks, _MAX_RESULTS)) as outputs:
+        for task, output in zip(tasks, outputs, strict=True):
+            check()
+            store.write(task, output)
+            report()

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
@@ -20,12 +19,10 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.errors import CancelledError
-from relume.core.thread_pools import map_ordered
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
 from relume.live.fixed_camera.protocols import OpenBake
 from relume.live.opened.edited_glass import ViewMethod, light_through_glass
-from relume.live.opened.extended_store import ExtendedStore, split_tasks
+from relume.live.opened.extended_store import ExtendedStore, split_tasks, write_tasks
 from relume.live.opened.fixed_views import BakedFixedViews
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
@@ -47,7 +44,7 @@ from relume.views.view import View, open_view
 
 _RAYS, _GLOSSY_RAYS, _DIFFUSE_RAYS = 123, 34, 89  # a third or less of a bake's; lattices of Fibonacci sizes
 _ROWS_PER_TASK = 4096  # at most half a second of work, which bounds the time to cancel
-_TASKS_PER_BATCH, _MAX_RESULTS = 32, 4  # until another caller has its turn; in memory before they are stored
+_TASKS_PER_BATCH = 32  # until another caller has its turn
 _SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the stage between these is in the bake
 _LIGHT_FRACTION = 0.3  # of the progress of a view with edited glass; the rest is the view
 
@@ -173,21 +170,19 @@ class StaticTracing:
         Raises:
             CancelledError: `is_canceled` returned True.
         """
+        num_tasks = len(self._tasks) if reflects else self._num_shadow_tasks
 
         def compute(task: Task) -> TaskOutput:
-            if is_canceled():
-                raise CancelledError("the static view was canceled")
             return self._method.compute(self._scene, self._recipe, task, self.store)
 
-        num_tasks = len(self._tasks) if reflects else self._num_shadow_tasks
+        def report() -> None:
+            self._num_done += 1
+            progress(self._num_done / num_tasks)
+
         while self._num_done < num_tasks:
             with self._lock:  # concurrent callers share the work
                 batch = self._tasks[self._num_done : min(self._num_done + _TASKS_PER_BATCH, num_tasks)]
-                with closing(map_ordered(compute, batch, _MAX_RESULTS)) as outputs:
-                    for task, output in zip(batch, outputs, strict=True):
-                        self.store.write(task, output)
-                        self._num_done += 1
-                        progress(self._num_done / num_tasks)
+                write_tasks(self.store, batch, compute, report, is_canceled)
         progress(1.0)
 
 
