@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from relume.camera.planar_mirrors import MAX_PLANES, PlanarMirrors, find_planar_mirrors, has_planar_mirrors
 from relume.core.color import luminance
-from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.errors import ChunkDamagedError
 from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.methods.store_layout import read_lights, read_tiles
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.scene.model import Scene
 from relume.store.bake_protocol import Recipe, StoreReader
+from relume.store.optional_arrays import has_array
 
 F32 = NDArray[np.float32]
 
@@ -105,9 +106,7 @@ def make_mirror_lights(
 
 def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
     """Read the mirror lights of a store; None without planar mirrors or bright lights."""
-    try:
-        store.shape("mirror_lights/offset")
-    except StoreError:
+    if not has_array(store, "mirror_lights/offset"):
         return None
 
     def read(name: str) -> NDArray[Any]:

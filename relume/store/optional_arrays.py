@@ -24,3 +24,8 @@ def read_optional(store: StoreReader, path: str, start: int = 0, stop: int | Non
         raise
     except StoreError:
         return None
+
+
+def has_array(store: StoreReader, path: str) -> bool:
+    """Tell if a store has an array. Raises as `read_optional`."""
+    return read_optional(store, path, stop=0) is not None

@@ -23,6 +23,7 @@ from relume.raytrace.alpha_filter import STOP_AT_PARTIAL
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.embree import EmbreeScene
 from relume.store.bake_protocol import StoreReader
+from relume.store.optional_arrays import has_array
 
 F32 = NDArray[np.float32]
 Materials = NDArray[np.integer[Any]]
@@ -64,9 +65,9 @@ class ObjectMaterialStore:
         if store.attributes.get("has_alpha_test"):
             rule = store.read("alpha_masks/material_rule")
             self._arrays["alpha_masks/material_rule"] = np.append(rule, rule[self._bases])
-        if _has(store, "patches/material"):
+        if has_array(store, "patches/material"):
             self._assign_patches()
-        if _has(store, "probes/material"):
+        if has_array(store, "probes/material"):
             self._assign_probes()
         else:
             for k in range(len(store.attributes["views"])):
@@ -143,7 +144,7 @@ class ObjectMaterialStore:
         """Sort the samples of a view by their materials; background samples stay last."""
         material = self._store.read(f"{prefix}material")
         num = int(np.searchsorted(material, BACKGROUND))
-        names = "position", "surface_normal" if _has(self._store, f"{prefix}surface_normal") else "normal"
+        names = "position", "surface_normal" if has_array(self._store, f"{prefix}surface_normal") else "normal"
         points = (np.asarray(self._store.read(prefix + name, 0, num), np.float32) for name in names)
         assigned = np.append(self._assign(material[:num], *points), material[num:])
         order = np.argsort(assigned, kind="stable")
@@ -180,7 +181,7 @@ class ObjectMaterialStore:
     def _check_mirrors(self, materials: Sequence[ObjectMaterial]) -> None:
         """Raise ParameterError if a base material is a mirror: the bake has traced what its surfaces show."""
         paths = [f"views/{k}/mirror" for k in range(len(self._attributes["views"]))]
-        paths = [path for path in [*paths, "mirror_lights/material"] if _has(self._store, path)]
+        paths = [path for path in [*paths, "mirror_lights/material"] if has_array(self._store, path)]
         mirrors = {int(index) for path in paths for index in np.unique(self._store.read(path))}
         for material, base in zip(materials, self._bases, strict=True):
             if base in mirrors:
@@ -191,11 +192,3 @@ class ObjectMaterialStore:
 def _folder(path: str) -> str:
     """Return the start of the paths of arrays that have the same rows as an array."""
     return "probes/" if path in _PROBE_TRANSFER else path[: path.rfind("/") + 1]
-
-
-def _has(store: StoreReader, path: str) -> bool:
-    try:
-        store.shape(path)
-    except StoreError:
-        return False
-    return True
