@@ -25,7 +25,7 @@ def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Edito
     moves = page.get_by_label("Motion")
     moves.select_option("environment")
     time = page.get_by_role("slider", name="Time")
-    expect(page.get_by_role("button", name="Play")).to_be_enabled()
+    expect(page.get_by_role("button", name="Play", exact=True)).to_be_enabled()
     turned = []
     for place in ("Home", "PageUp", "Home", "PageUp"):  # the environment turns, under one look
         time.focus()
@@ -43,7 +43,7 @@ def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Edito
     assert sigmas[0] != sigmas[1]
     for _ in range(2):
         before = time.get_attribute("aria-valuetext")
-        page.get_by_role("button", name="Play").click()
+        page.get_by_role("button", name="Play", exact=True).click()
         expect(time).not_to_have_attribute("aria-valuetext", before or "")
         page.get_by_role("button", name="Pause").click()
     shown = []

@@ -86,7 +86,7 @@ def test_everything_in_the_editor_can_be_reached(editor: Editor, size: tuple[int
     keys.get_by_text("Side-by-side view").scroll_into_view_if_needed()
     assert_nothing_is_cut_off(page, "the keyboard map")
     page.keyboard.press("Escape")
-    page.locator(".top-bar .menu > button").click()
+    page.locator(".top-bar .menu > button", has_text="direct light").click()
     expect(page.locator(".presets .plan").first).to_contain_text("memory", timeout=WAIT_MS)
     assert_nothing_is_cut_off(page, "the bake menu")
     page.keyboard.press("Escape")
