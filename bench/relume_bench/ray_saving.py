@@ -32,10 +32,8 @@ from relume_bench.scenes import LAMBERT
 from relume_bench.timing import seconds
 
 
-class _EveryRay(SampledViews):
-    """A bake without predictions."""
-
-    name = "direct"
+class _EveryRayViews(SampledViews):
+    """Views without predictions."""
 
     def _visibility(self, scene: Scene, k: int, task: Task, store: StoreReader) -> TaskOutput:
         position = store.read(f"views/{k}/position", task.start, task.stop)
@@ -43,6 +41,14 @@ class _EveryRay(SampledViews):
         embree = self.geometry_of(scene).embree
         traced = trace_visibility(embree, position, normal, read_lights(store).direction)
         return TaskOutput({f"views/{k}/visibility": traced.visible}, traced.num_rays, traced.trace_s)
+
+
+class _EveryRay(DirectMethod):
+    """A bake without predictions."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._views = _EveryRayViews()
 
 
 _BAKES: tuple[BakeMethod, ...] = (DirectMethod(), _EveryRay())

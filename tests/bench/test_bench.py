@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,8 @@ def groups_of(module: str) -> list[registry.Group]:
 
 
 def check(group: registry.Group) -> None:
-    figures = group.measure(tiny=True)
+    with ThreadPoolExecutor(1) as pool:  # the main thread may have the event loop of a browser
+        figures = pool.submit(group.measure, tiny=True).result()
     assert [figure.name for figure in figures] == list(group.names)
     for figure in figures:
         assert "failed" not in figure.context, figure.context

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from relume.assets.environments.environment import Environment
 from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.picture import Progress
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis
 from relume.look import default_look
 from relume.scene.model import Camera, Material, Mesh, Scene
@@ -199,13 +199,12 @@ class _Picture:
     def next_job(self) -> None:
         return None
 
-    def advance(self, max_coefficients: int | None) -> Any:
+    def advance(self, max_coefficients: int | None) -> Progress:
         tiles = self.all_tiles()[:CHANGED_TILES] if self.is_due else []
         if self.is_due:
             burn(self.frame_s)
         self.is_due = False
-        state = {"exact": True, "fidelity": Fidelity.EXACT, "complete": True, "free_camera_error": None}
-        return SimpleNamespace(tiles=tiles, changed=bool(tiles), **state)
+        return Progress(tiles, exact=True, fidelity=Fidelity.EXACT, complete=True)
 
     def all_tiles(self) -> list[tuple[int, int, int, int]]:
         width, height = self.view.width, self.view.height
