@@ -266,7 +266,7 @@ def _trace(tracer, points, wo, footprint, level, lookup, surfaces, pattern, star
     packet, lanes, end = new_packet(tracer), allocate_lanes(), np.int64(0)
     shifts, levels = np.empty((2, LANES), np.float32), np.empty(LANES, np.int64)
     is_lit = _is_lit(lookup, surfaces)
-    lanes.patches[:] = NO_PATCH
+    lanes.patches[:] = NO_PATCH  # stays so in direct light, where hits are not looked up
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for k in range(LANES):
