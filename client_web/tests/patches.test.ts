@@ -44,8 +44,8 @@ const EDITS: [path: string, value: unknown][] = [
   ["/lights/A~1B", { kind: "point", position: [0, 1, 0] }],
   ["/lights/A~1B/position", [1, 1, 1]],
   ["/lights/A~1B", undefined],
-  ["/lights/constructor", { kind: "point", position: [0, 1, 0] }],
-  ["/lights/constructor/position", [1, 1, 1]],
+  ["/lights/prototype", { kind: "point", position: [0, 1, 0] }],
+  ["/lights/prototype/position", [1, 1, 1]],
   ["/materials/Teapot/terms", LOOK.materials.Teapot?.terms.slice(0, 1)],
   ["/display/exposure", -1.5],
 ];

@@ -20,6 +20,7 @@ from relume.core.validation import (
 from relume.look.link_validation import check_link
 from relume.scene.light_members import MEMBER_KINDS
 from relume.scene.model import Light
+from relume.scene.unique_names import INHERITED_NAMES
 from relume.scene.validate import (
     ENVIRONMENT,
     MAX_EMISSION,
@@ -47,7 +48,7 @@ LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; m
     "cone": (0.0, 90.0),
 }
 
-RESERVED_LIGHT_NAMES = (ENVIRONMENT, "__proto__")  # JavaScript does not keep the latter as a name
+RESERVED_LIGHT_NAMES = (ENVIRONMENT, *INHERITED_NAMES)
 _WHITE = (1.0, 1.0, 1.0)
 _COMMON_DEFAULTS: dict[str, Any] = {
     "intensity": 1.0,
@@ -149,7 +150,8 @@ def _complete_light(name: str, lights: Mapping[str, Any], default: Any, previous
     if partial is default or partial is previous:
         return partial
     pointer: Pointer = ("lights", name)
-    check_light_name(pointer, name)
+    if default is None:  # scenes of earlier versions may have other names
+        check_light_name(pointer, name)
     if not isinstance(partial, Mapping):
         raise invalid_value(pointer, partial, "an object")
     return _merge(pointer, partial, _base_fields(pointer, partial, default))

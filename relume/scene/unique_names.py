@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from relume.core.import_warnings import UNREADABLE
 
+INHERITED_NAMES = (
+    "__defineGetter__", "__defineSetter__", "__lookupGetter__", "__lookupSetter__", "__proto__", "constructor",
+    "hasOwnProperty", "isPrototypeOf", "propertyIsEnumerable", "toLocaleString", "toString", "valueOf",
+)  # fmt: skip
+"""Properties that every object of JavaScript has: the editor would find them where it looks for a removed light."""
+
 
 def unique_name(preferred: str, used_names: dict[str, int]) -> str:
     """Return a unique name of at most 80 characters, without characters special to JSON pointers or terminals."""
     plain = UNREADABLE.sub("", preferred[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
-    plain = plain.replace("__proto__", "proto")  # what JavaScript does not keep as a name
+    if plain in INHERITED_NAMES:
+        used_names.setdefault(plain, 1)
     return append_number(plain or "unnamed", " ", used_names)
 
 

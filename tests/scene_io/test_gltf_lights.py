@@ -57,12 +57,12 @@ def test_punctual_lights_have_the_pose_and_intensity_of_their_node() -> None:
     assert len([warning for warning in scene.warnings if "683" in warning]) == 1
 
 
-def test_lights_get_other_names_than_the_environment_and_than_javascript_loses() -> None:
+def test_lights_get_other_names_than_the_environment_and_than_all_objects_of_javascript_have() -> None:
     lights = [{"type": "point", "name": name} for name in ("environment", "__proto__", "constructor")]
     scene = imported(with_lights(lights))
-    assert [light.name for light in scene.lights] == ["environment 2", "proto", "constructor"]
+    assert [light.name for light in scene.lights] == ["environment 2", "__proto__ 2", "constructor 2"]
     default = default_look(scene.materials, scene.lights)
-    for name in ("environment", "__proto__"):
+    for name in ("environment", "toString"):
         with pytest.raises(ParameterError, match="reserved"):
             complete({"lights": {name: {"kind": "point"}}}, default)
 

@@ -1,5 +1,5 @@
 /** The kinds of light: labels, and creating a new one. */
-import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../../look.gen";
+import { DEFAULT_LIGHTS, MAX_LIGHT_NAME, RESERVED_LIGHT_NAMES } from "../../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../../protocol";
 import { isAimed } from "./handleGeometry";
 import { add, length, scale, subtract, roundComponents } from "./vector";
@@ -131,7 +131,7 @@ export function createLight(kind: AddedKind, { position, normal, distance, radia
 
 /** The first unused name of "Spot", "Spot 2", …; after "Key 2" comes "Key 3". */
 export function nextLightName(like: string, usedNames: readonly string[]): string {
-  if (!usedNames.includes(like)) return like;
+  if (!usedNames.includes(like) && !RESERVED_LIGHT_NAMES.includes(like)) return like;
   const stem = like.replace(/ \d+$/, "").slice(0, MAX_LIGHT_NAME - 4);
   let n = 2;
   while (usedNames.includes(`${stem} ${n}`)) n += 1;

@@ -52,7 +52,7 @@ export function changeByPatch(look: Look, patch: readonly PatchOp[]): LookChange
   return makeChange(look, (draft) => patch.forEach((operation) => apply(draft, operation)));
 }
 
-/** Apply one operation. Throws for a path that does not exist. Immer's own refuses names like "constructor", which
+/** Apply one operation. Throws for a path that does not exist. Immer's own refuses the name "prototype", which
  * materials may have. */
 function apply(draft: DraftNode, { op, path, value }: PatchOp): void {
   const parents = pointerTokens(path);
