@@ -2,7 +2,7 @@
 import { batch, computed } from "@preact/signals";
 import { jsonPointer } from "../../state/document/pointer";
 import { editValue, replaceLook } from "../../edit/edit";
-import { MAX_LIGHTS, RESERVED_LIGHT_NAMES } from "../../look.gen";
+import { MAX_LIGHTS } from "../../look.gen";
 import type { Light, Look, Triple } from "../../protocol";
 import { soloLight } from "../../state/visibility/soloSources";
 import { defaultLook, look } from "../../state/look";
@@ -10,7 +10,7 @@ import { selectedLight, selectLight } from "../../state/selection";
 import { showNote } from "../../ui/toasts";
 import type { LightChange } from "./handleGeometry";
 import { groupOfLight, lightGroups, withoutLights } from "./lightGroups";
-import { isAddedKind, offsetCopy, nextLightName } from "./lightKinds";
+import { isAddedKind, nameProblem, offsetCopy, nextLightName } from "./lightKinds";
 
 export const lights = computed<Record<string, Light>>(() => look.value?.lights ?? {});
 export const lightNames = computed(() => Object.keys(lights.value));
@@ -70,8 +70,8 @@ function withRenamedLight(groups: Look["light_groups"], name: string, to: string
 export function renameLight(name: string, to: string): void {
   const current = look.peek();
   if (current === null || !isAddedLight(name) || to === name) return;
-  if (RESERVED_LIGHT_NAMES.includes(to)) return showNote(`“${to}” is reserved. Use another name.`);
-  if (Object.hasOwn(current.lights, to)) return showNote(`A light named “${to}” already exists.`);
+  const problem = nameProblem("light", to, current.lights);
+  if (problem !== null) return showNote(problem);
   const renamed = Object.entries(current.lights).map(([entryName, light]) => [
     entryName === name ? to : entryName,
     light,

@@ -1,12 +1,12 @@
 /** The light groups of the look: creating, renaming and dissolving them, and moving lights between them. */
 import { batch, computed } from "@preact/signals";
 import { editValue, replaceLook } from "../../edit/edit";
-import { MAX_LIGHT_GROUPS, RESERVED_LIGHT_NAMES, type LightGroupLook } from "../../look.gen";
+import { MAX_LIGHT_GROUPS, type LightGroupLook } from "../../look.gen";
 import { jsonPointer } from "../../state/document/pointer";
 import { look } from "../../state/look";
 import { groupSource, soloLight } from "../../state/visibility/soloSources";
 import { showNote } from "../../ui/toasts";
-import { nextLightName } from "./lightKinds";
+import { nameProblem, nextLightName } from "./lightKinds";
 
 export type Groups = Readonly<Record<string, LightGroupLook>>;
 
@@ -106,8 +106,8 @@ export function createGroup(light: string): void {
 /** Rename a group; it keeps its position in the list. */
 export function renameGroup(name: string, to: string): void {
   const groups = lightGroups.peek();
-  if (RESERVED_LIGHT_NAMES.includes(to)) return showNote(`“${to}” is reserved. Use another name.`);
-  if (Object.hasOwn(groups, to)) return showNote(`A light group named “${to}” already exists.`);
+  const problem = nameProblem("light group", to, groups);
+  if (problem !== null) return showNote(problem);
   const renamed = Object.entries(groups).map(([key, group]) => [key === name ? to : key, group]);
   batch(() => {
     replaceGroups(`${name} · Rename to ${to}`, Object.fromEntries(renamed) as Groups);

@@ -138,6 +138,12 @@ export function nextLightName(like: string, usedNames: readonly string[]): strin
   return `${stem} ${n}`;
 }
 
+/** Why a light, or a group of lights, cannot be renamed so; null if it can. */
+export function nameProblem(kind: "light" | "light group", name: string, used: object): string | null {
+  if (RESERVED_LIGHT_NAMES.includes(name)) return `“${name}” is reserved. Use another name.`;
+  return Object.hasOwn(used, name) ? `A ${kind} named “${name}” already exists.` : null;
+}
+
 const COPY_OFFSET = 0.25;
 
 /** A copy of a light, offset so that the handles do not coincide. */

@@ -55,21 +55,20 @@ export function changeByPatch(look: Look, patch: readonly PatchOp[]): LookChange
 /** Apply one operation. Throws for a path that does not exist. Immer's own refuses the name "prototype", which
  * materials may have. */
 function apply(draft: DraftNode, { op, path, value }: PatchOp): void {
-  const parents = pointerTokens(path);
-  const last = parents.pop();
-  const node = parents.reduce<unknown>((parent, token) => (hasOwn(parent, token) ? parent[token] : undefined), draft);
-  if (last === undefined || typeof node !== "object" || node === null) throw new Error(`No ${path} to ${op}`);
-  if (op !== "add" && !hasOwn(node, last)) throw new Error(`No ${path} to ${op}`);
+  const node = getAt(draft, path.slice(0, path.lastIndexOf("/")));
+  const key = pointerTokens(path).at(-1);
+  if (key === undefined || !isNode(node) || (op !== "add" && !Object.hasOwn(node, key)))
+    throw new Error(`No ${path} to ${op}`);
   if (Array.isArray(node) && op !== "replace") {
-    const index = last === "-" ? node.length : Number(last);
+    const index = key === "-" ? node.length : Number(key);
     if (op === "add") node.splice(index, 0, structuredClone(value));
     else node.splice(index, 1);
-  } else if (op === "remove") Reflect.deleteProperty(node, last);
-  else (node as DraftNode)[last] = structuredClone(value);
+  } else if (op === "remove") Reflect.deleteProperty(node, key);
+  else node[key] = structuredClone(value);
 }
 
-function hasOwn(node: unknown, key: string): node is DraftNode {
-  return typeof node === "object" && node !== null && Object.hasOwn(node, key);
+function isNode(value: unknown): value is DraftNode {
+  return typeof value === "object" && value !== null;
 }
 
 /** The change to another look. */
