@@ -22,10 +22,15 @@ WORDS = arrays(np.uint32, 8, elements=st.integers(0, 2**32 - 1))
 def test_decoded_pixels_differ_by_at_most_half_a_step(pixels: F32) -> None:
     decoded = rgb9e5_unpack(pack_pixels(pixels)).astype(np.float64)
     clamped = np.minimum(pixels, RGB9E5_MAX).astype(np.float64)
-    # the step of the largest channel is 2⁻⁸ to 2⁻⁹ of it; the smallest step is 2⁻²⁴
-    _, exponent = np.frexp(clamped.max(axis=1, keepdims=True))
-    step = np.ldexp(1.0, np.maximum(exponent - 9, -24))
+    # the step of the largest channel is 2⁻⁸ to 2⁻⁹ of it, once it is rounded; the smallest step is 2⁻²⁴
+    largest = clamped.max(axis=1, keepdims=True)
+    step = _step(largest + _step(largest) / 2)
     assert (np.abs(decoded - clamped) <= step / 2).all()
+
+
+def _step(largest: NDArray[np.float64]) -> NDArray[np.float64]:
+    _, exponent = np.frexp(largest)
+    return np.ldexp(1.0, np.maximum(exponent - 9, -24))
 
 
 @for_all(60, words=WORDS)

@@ -20,6 +20,7 @@ let nextId = 1;
 const NOTE_MS = 5000;
 /** Long messages stay longer. */
 const NOTE_MS_PER_CHARACTER = 60;
+/** Of notes, and of errors: no note removes an error. */
 const MAX_SHOWN = 3;
 
 /** The visible texts. */
@@ -32,13 +33,20 @@ function dismissToast(id: number): void {
 function addToast(toast: Omit<Toast, "id">): void {
   const id = nextId++;
   const remaining = toasts.value.filter((current) => current.text !== toast.text);
-  toasts.value = [...remaining, { ...toast, id }].slice(-MAX_SHOWN);
+  const ofKind = remaining.filter(({ kind }) => kind === toast.kind);
+  const removed = ofKind.slice(0, Math.max(0, ofKind.length + 1 - MAX_SHOWN));
+  toasts.value = [...remaining.filter((current) => !removed.includes(current)), { ...toast, id }];
   if (toast.kind === "note")
     window.setTimeout(() => dismissToast(id), Math.max(NOTE_MS, NOTE_MS_PER_CHARACTER * toast.text.length));
 }
 
 export function showNote(text: string, action?: Toast["action"]): void {
   addToast({ kind: "note", text, ...(action ? { action } : {}) });
+}
+
+/** Show what reading a file has changed, in one note. */
+export function showWarnings(warnings: readonly string[]): void {
+  if (warnings.length > 0) showNote(warnings.join(" "));
 }
 
 export function showError(error: unknown, topic?: ToastTopic): void {

@@ -5,7 +5,7 @@ import { history } from "../../edit/history";
 import type { IesBody, Light, Rgb } from "../../protocol";
 import { deleteIes, listIes } from "../../session/net/api";
 import { uploadIes } from "../../session/net/upload";
-import { reportErrors, showNote } from "../../ui/toasts";
+import { reportErrors, showNote, showWarnings } from "../../ui/toasts";
 import { editLight, lightPath, lights } from "./lightEdits";
 
 /** Null until the server has listed them. */
@@ -50,7 +50,7 @@ export async function uploadAndAssignIes(name: string, file: File): Promise<void
   if (ies === undefined) return;
   await loadIesFiles();
   assignIes(name, ies);
-  for (const warning of ies.warnings) showNote(warning);
+  showWarnings(ies.warnings);
 }
 
 /** Delete an IES file after confirmation; the light emits evenly again. Saved looks keep theirs. */

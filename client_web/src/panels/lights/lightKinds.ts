@@ -2,7 +2,7 @@
 import { DEFAULT_LIGHTS, MAX_LIGHT_NAME, RESERVED_LIGHT_NAMES } from "../../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../../protocol";
 import { isAimed } from "./handleGeometry";
-import { add, length, scale, subtract, roundComponents } from "./vector";
+import { add, length, normalize, scale, subtract, roundComponents } from "./vector";
 
 /** Kinds that can be added; emissive meshes come with a scene or an emission map, sources of many lights with a scene. */
 export type AddedKind = Exclude<LightKind, "mesh" | "points" | "panels" | "directionals" | "surfaces">;
@@ -101,7 +101,11 @@ export function createLight(kind: AddedKind, { position, normal, distance, radia
     case "spot":
       return { ...DEFAULT_LIGHTS.spot, emission: intensity, position: lightPosition, direction };
     case "directional":
-      return { ...DEFAULT_LIGHTS.directional, emission: gray(irradiance), direction };
+      return {
+        ...DEFAULT_LIGHTS.directional,
+        emission: gray(irradiance),
+        direction: roundComponents(normalize(direction)),
+      };
     case "rectangle": {
       const side = Number((SIDE_FRACTION * offset).toPrecision(2));
       const emission = gray((irradiance * offset ** 2) / side ** 2);

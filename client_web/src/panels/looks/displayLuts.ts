@@ -5,7 +5,7 @@ import type { LutBody } from "../../protocol";
 import { deleteLut, listLuts } from "../../session/net/api";
 import { uploadLut } from "../../session/net/upload";
 import { look } from "../../state/look";
-import { reportErrors, showNote } from "../../ui/toasts";
+import { reportErrors, showNote, showWarnings } from "../../ui/toasts";
 
 export const LUT_SUFFIX = ".cube";
 export const luts = signal<readonly LutBody[]>([]);
@@ -38,7 +38,7 @@ export async function importLutFile(file: File): Promise<void> {
   if (body === undefined) return;
   await loadLuts();
   chooseLut(body.lut);
-  for (const warning of body.warnings) showNote(warning);
+  showWarnings(body.warnings);
 }
 
 /** Delete a LUT after confirmation. */

@@ -6,7 +6,7 @@ import { deleteEnvironment, listEnvironments } from "../../session/net/api";
 import { uploadEnvironment } from "../../session/net/upload";
 import type { EnvironmentBody } from "../../protocol";
 import { look } from "../../state/look";
-import { reportErrors, showNote, showError } from "../../ui/toasts";
+import { reportErrors, showNote, showWarnings, showError } from "../../ui/toasts";
 
 export const environments = signal<EnvironmentBody[]>([]);
 /** Progress text of the import. */
@@ -67,5 +67,5 @@ export async function importEnvironmentFile(files: readonly File[]): Promise<voi
   if (body === undefined) return;
   await loadEnvironments();
   chooseEnvironment(body.map);
-  for (const warning of body.warnings) showNote(warning);
+  showWarnings(body.warnings);
 }

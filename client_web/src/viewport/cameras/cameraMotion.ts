@@ -4,6 +4,10 @@ import { interpolateOrbits, isClose, type Orbit } from "./orbit";
 const EASING_MS = 70; // time constant: 1/e of the distance is left after this
 const LONGEST_MS = 50; // no jump after the page was in the background
 
+/** Time since the last step of a motion. A frame may have begun before the event that started the motion. */
+export const elapsedMs = (now: number, last: number, longest: number): number =>
+  Math.max(0, Math.min(longest, now - last));
+
 export class CameraMotion {
   private goal: Orbit;
   private frame = 0;
@@ -43,8 +47,8 @@ export class CameraMotion {
   }
 
   private step(now: number): void {
-    const fraction = this.isLast() ? 1 : 1 - Math.exp(-Math.min(LONGEST_MS, now - this.lastTime) / EASING_MS);
-    this.lastTime = now;
+    const fraction = this.isLast() ? 1 : 1 - Math.exp(-elapsedMs(now, this.lastTime, LONGEST_MS) / EASING_MS);
+    this.lastTime = Math.max(now, this.lastTime);
     const next = interpolateOrbits(this.displayed, this.goal, fraction);
     const isLast = isClose(next, this.goal);
     this.displayed = isLast ? this.goal : next;

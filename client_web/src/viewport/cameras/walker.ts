@@ -1,6 +1,7 @@
 /** Moves a camera while walking keys are held. */
 import { add, length, scale } from "../../panels/lights/vector";
 import type { Triple } from "../../protocol";
+import { elapsedMs } from "./cameraMotion";
 import { walkSpeed, type Steerable } from "./navigation";
 import { walkOrbit } from "./orbit";
 
@@ -54,8 +55,8 @@ export class Walker {
     const camera = this.camera();
     this.frame = this.held.size > 0 && camera !== null ? requestAnimationFrame((later) => this.step(later)) : 0;
     const direction = [...this.held].reduce<Triple>((sum, code) => add(sum, DIRECTIONS[code] as Triple), [0, 0, 0]);
-    const seconds = Math.min(LONGEST_MS, now - this.lastTime) / 1000;
-    this.lastTime = now;
+    const seconds = elapsedMs(now, this.lastTime, LONGEST_MS) / 1000;
+    this.lastTime = Math.max(now, this.lastTime);
     if (camera === null || length(direction) === 0) return;
     const meters = (walkSpeed(camera.bounds) * (this.isFast ? FAST : 1) * seconds) / length(direction);
     const isLevel = this.isLevel();

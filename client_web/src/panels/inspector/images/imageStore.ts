@@ -11,7 +11,7 @@ import { MAX_LIGHTS } from "../../../look.gen";
 import { defaultLook, look } from "../../../state/look";
 import { scene } from "../../../state/scene";
 import { selectMaterial } from "../../../state/selection";
-import { reportErrors, showNote } from "../../../ui/toasts";
+import { reportErrors, showNote, showWarnings } from "../../../ui/toasts";
 import { baseTexture, hasBaseColor, withBaseImage, withoutBaseImage } from "./baseColor";
 import { emittingLight, lightWithoutImage, meshLightOf } from "./emission";
 import { canBeMetal, metalnessOf, withoutMetalness } from "./metalness";
@@ -231,7 +231,7 @@ export async function uploadAndAssign(material: string, file: File, assign: Assi
   if (image === undefined) return;
   await loadImages();
   await assign(material, image);
-  for (const warning of image.warnings) showNote(warning);
+  showWarnings(image.warnings);
 }
 
 /** Delete an image after confirmation; the material gets its original map back. Saved looks keep theirs. */
