@@ -267,7 +267,7 @@ def shade_view(transfer, view: View, look):
                 image *= texture[level_rows]
             for curve in term.curves:
                 if curve.depends_on_view:
-                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o[rows][level_rows])).T
+                    image *= curve_values(document, curve, np.arccos(view.cos_theta_o(index)[level_rows])).T
             out[rows][level_rows] += image
         out[rows] += evaluate_emission(transfer, view, index, look)
     if look.transport.paths.direct:

@@ -110,7 +110,7 @@ def _full_image(transfer: FixedViewTransfer, look: Look) -> F64:
     for k, name in enumerate(transfer.material_names):
         rows = view.rows(k)
         for document in look.materials[name].terms:
-            radiance[rows] += _full_term(transfer, view.receivers(k), dict(document), view.cos_theta_o[rows])
+            radiance[rows] += _full_term(transfer, view.receivers(k), dict(document), view.cos_theta_o(k))
     weighted = np.empty((view.width * view.height, 3))
     pixel_index = np.repeat(np.arange(view.width * view.height), np.diff(view.first))
     for c in range(3):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol, TypeGuard
@@ -186,7 +186,7 @@ class ShadingPoints:
         points: the surface points. wo: view directions, unit, world space.
         visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon.
         rays: light along rays; empty for the environment's triangles alone.
-        uv: see `relume.raytrace.surface_interaction.SurfaceInteraction`; None if unknown.
+        read_uv: returns `uv`, which only measured textures need.
         level: level of roughness, see `relume.transport.roughness_ranges`; None if all have the same.
     """
 
@@ -194,8 +194,13 @@ class ShadingPoints:
     wo: Shaped[F32, "n 3"]
     visible: Shaped[NDArray[np.uint8], "n bytes"]
     rays: Sequence[RayList] = ()
-    uv: Shaped[F32, "n uv"] | None = None
+    read_uv: Callable[[], Shaped[F32, "n uv"] | None] = lambda: None
     level: Shaped[NDArray[np.uint8], " n"] | None = None
+
+    @cached_property
+    def uv(self) -> Shaped[F32, "n uv"] | None:
+        """See `relume.raytrace.surface_interaction.SurfaceInteraction`; None if unknown."""
+        return self.read_uv()
 
     @property
     def normal(self) -> Shaped[F32, "n 3"]:
@@ -209,10 +214,14 @@ class ShadingPoints:
 
     def without_light(self, rows: Shaped[NDArray[np.integer], " m"]) -> ShadingPoints:
         """Select points without their visibility and rays."""
-        uv = None if self.uv is None else self.uv[rows]
+        read_uv = self.read_uv  # not `self`, which would keep its arrays
+
+        def selected_uv() -> Shaped[F32, "m uv"] | None:
+            return None if (uv := read_uv()) is None else uv[rows]
+
         level = None if self.level is None else self.level[rows]
         no_visibility = np.empty((len(rows), 0), np.uint8)
-        return ShadingPoints(self.points.rows(rows), self.wo[rows], no_visibility, uv=uv, level=level)
+        return ShadingPoints(self.points.rows(rows), self.wo[rows], no_visibility, read_uv=selected_uv, level=level)
 
     def subset(self, rows: Shaped[NDArray[np.integer], " m"]) -> ShadingPoints:
         """Select points with the visibility and rays of each, not shared among neighbors."""

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.thread_pools import parallel_for_chunks
+from relume.core.thread_pools import map_ordered, parallel_for_chunks
 from relume.views.view import View
 
 F32 = NDArray[np.float32]
@@ -49,20 +49,16 @@ def block_sizes(view: View, num_blocks: int) -> Shaped[NDArray[np.int64], " mate
 
 def _normal_changes(view: View) -> Shaped[NDArray[np.float64], " materials"]:
     """RMS difference κ of the normals of adjacent pixels in a row, of each material; at least `_LEAST_CHANGE`."""
-    changes = []
-    for material in range(len(view.bounds) - 1):
+
+    def change(material: int) -> float:
         pixel, first = np.unique(view.pixel[view.rows(material)], return_index=True)
-        normal = _normals(view, material)[first]
+        normal = view.normals(material)[first]
         is_adjacent = np.diff(pixel.astype(np.int64)) == 1
         squared = np.square(np.diff(normal, axis=0)[is_adjacent], dtype=np.float64).sum(axis=1)
-        changes.append(max(_LEAST_CHANGE, float(np.sqrt(squared.mean())) if len(squared) else 0.0))
-    return np.array(changes)
+        return max(_LEAST_CHANGE, float(np.sqrt(squared.mean())) if len(squared) else 0.0)
 
-
-def _normals(view: View, material: int) -> F32:
-    """Read the normals of a material's samples. (n, 3)"""
-    rows = view.rows(material)
-    return view.store.read(f"views/{view.index}/normal", rows.start, rows.stop)
+    materials = range(len(view.bounds) - 1)
+    return np.array(list(map_ordered(change, materials, len(materials))))
 
 
 def one_per_block(view: View, material: int, block_size: int) -> Shaped[NDArray[np.intp], " blocks"]:
@@ -97,7 +93,7 @@ def nearest_chosen(
     """
     rows = view.rows(material)
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
-    scaled_normal = _BLOCKS_PER_NORMAL_UNIT * block_size * _normals(view, material)
+    scaled_normal = _BLOCKS_PER_NORMAL_UNIT * block_size * view.normals(material)
     features = np.concatenate([x[:, None], y[:, None], scaled_normal], axis=1, dtype=np.float32)
     num_columns, num_rows = -(-view.width // block_size), -(-view.height // block_size)
     block_sample = np.full((num_rows, num_columns), -1, np.int32)

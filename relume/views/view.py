@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 from weakref import WeakValueDictionary
@@ -18,6 +18,7 @@ from relume.brdf.texture_slots import EmissionImage
 from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.thread_pools import map_ordered
 from relume.images.image_store import load_emission_image, load_texture
 from relume.math.uv_transform import UvTransform
 from relume.patches.hit_distance import mean_inverse_distance
@@ -53,7 +54,6 @@ Tile = tuple[int, int, int, int]
 
 TILE_PIXELS = 64
 _TEXTURE_NAMES = ("diffuse", "specular")
-_ROWS_PER_BATCH = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,6 @@ class View:
     mirrored: MirrorSamples | None
     is_mirrored: Shaped[NDArray[np.bool_], " surface_samples"]
     textures: Sequence[Mapping[str, F32]]
-    cos_theta_o: Shaped[NDArray[np.float64], " surface_samples"]
     level: Shaped[NDArray[np.uint8], " surface_samples"]
     level_pairs: tuple[tuple[tuple[float, float], ...], ...]
     frost: FrostFilter | None = None
@@ -202,6 +201,15 @@ class View:
         seed = read_seeds(self.store, self.index, rows.start, rows.stop)
         return read_surface_points(self.store, self.index, rows.start, rows.stop, seed)
 
+    def cos_theta_o(self, material: int) -> Shaped[NDArray[np.float64], " n"]:
+        """Read the cosines between a material's normals and view directions, zero at back faces."""
+        unlit = self._read_unlit(material)
+        return np.asarray(np.einsum("nc,nc->n", unlit.normal, unlit.wo.astype(np.float64)).clip(0, 1))
+
+    def normals(self, material: int) -> Shaped[F32, "n 3"]:
+        """Read the normals of a material's samples."""
+        return self._read_unlit(material).normal
+
     def receivers(self, material: int, *, is_lit: bool = True) -> ShadingPoints:
         """Read a material's samples from the store as shading points, without rays.
 
@@ -219,10 +227,11 @@ class View:
     def _make_unlit(self, material: int) -> ShadingPoints:
         rows = self.rows(material)
         surface_points = self.surface_points(material)
-        uv = read_uv(self.store, self.index, rows.start, rows.stop)
+        read = partial(read_uv, self.store, self.index, rows.start, rows.stop)
+        cached_uv = partial(self.cache.transient.get_value, (self.key, "uv", *self.sample_key(material)), read)
         level = self.level[rows] if self.level_pairs[material] else None
         wo = view_directions(self.ray_origins(rows), surface_points.position)
-        return ShadingPoints(surface_points, wo, np.empty((len(wo), 0), np.uint8), (), uv, level)
+        return ShadingPoints(surface_points, wo, np.empty((len(wo), 0), np.uint8), (), cached_uv, level)
 
     def _read_visibility(self, material: int) -> NDArray[np.uint8]:
         """Read the visibility of a material's samples, cached because decompression is slow."""
@@ -401,6 +410,8 @@ def open_view(
     if num_surface and int(material[num_surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that does not exist in the scene")
     bounds = np.searchsorted(material[:num_surface], np.arange(num_materials + 1)).astype(np.int64)
+    ends = list(pairwise(bounds.tolist()))
+    textures = list(map_ordered(lambda rows: _textures(store, prefix, *rows), ends, len(ends)))
     level, pairs = read_roughness_levels(store, index, num_surface), read_level_pairs(store)
     if any(not _are_valid_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], pairs, strict=True)):
         raise ChunkDamagedError(prefix, "its roughness levels do not fit its materials")
@@ -427,8 +438,7 @@ def open_view(
         origin=origin,
         mirrored=mirrored,
         is_mirrored=is_mirrored.astype(np.bool_, copy=False),
-        textures=[_textures(store, prefix, *ends) for ends in pairwise(bounds.tolist())],
-        cos_theta_o=_cos_theta_o(store, prefix, origin, num_surface),
+        textures=textures,
         level=level,
         level_pairs=pairs,
         maps=maps,
@@ -449,17 +459,6 @@ def _textures(store: StoreReader, prefix: str, start: int, stop: int) -> dict[st
     """Read the scene's textures at a material's samples, without those that are 1 everywhere."""
     read = {name: store.read(f"{prefix}/{name}", start, stop) for name in _TEXTURE_NAMES}
     return {name: values for name, values in read.items() if np.any(values != 1)}
-
-
-def _cos_theta_o(store: StoreReader, prefix: str, origin: F32, num: int) -> NDArray[np.float64]:
-    """Cosines between normals and view directions of surface samples. (num,)"""
-    cosines = np.empty(num)
-    for start in range(0, num, _ROWS_PER_BATCH):
-        rows = slice(start, min(start + _ROWS_PER_BATCH, num))
-        position, normal = (store.read(f"{prefix}/{name}", rows.start, rows.stop) for name in ("position", "normal"))
-        wo = view_directions(origin if len(origin) == 1 else origin[rows], position)
-        cosines[rows] = np.clip(np.einsum("nc,nc->n", normal, wo.astype(np.float64)), 0, 1)
-    return cosines
 
 
 def _are_valid_levels(level: NDArray[np.uint8], pairs: tuple[tuple[float, float], ...]) -> bool:

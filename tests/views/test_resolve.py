@@ -28,7 +28,7 @@ def make_view(width=100, height=70, seed=0):
         camera=Camera("v", np.eye(4), 0.8), index=0, width=width, height=height, store=None, cache=None, key="",
         bounds=np.int64([0, len(pixel)]), pixel=pixel, first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         order=order, throughput=weight[order, None].astype(np.float32), origin=np.zeros((1, 3), np.float32),
-        mirrored=None, is_mirrored=np.zeros(len(pixel), np.bool_), textures={}, cos_theta_o=np.ones(len(pixel)),
+        mirrored=None, is_mirrored=np.zeros(len(pixel), np.bool_), textures={},
         level=np.zeros(len(pixel), np.uint8), level_pairs=((),),
     )  # fmt: skip
 

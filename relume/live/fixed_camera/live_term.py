@@ -6,7 +6,7 @@ T · (c_target − c_displayed), the most important ones first if time is short.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -47,13 +47,24 @@ class LiveTerm:
     """
 
     def __init__(
-        self, document: Mapping[str, Any], cos_theta_o: F64, levels: RoughnessLevels, light: Illumination
+        self,
+        document: Mapping[str, Any],
+        num_samples: int,
+        read_cosine: Callable[[], F64],
+        levels: RoughnessLevels,
+        light: Illumination,
     ) -> None:
+        """Start from an empty image.
+
+        Args:
+            document, levels, light: see the attributes. num_samples: of the image.
+            read_cosine: returns cos θo of each sample; called at the first curve of it.
+        """
         self.light = light
         self._is_solo = False
         self._before_solo: DisplayedImage | None = None  # reference image for the end of the solo
-        self._cos_theta_o, self.levels = cos_theta_o, levels
-        tiles, samples = tile_layout(len(cos_theta_o))
+        self._read_cosine, self.levels = read_cosine, levels
+        tiles, samples = tile_layout(num_samples)
         self.ready = self.displayed = DisplayedImage(np.zeros((tiles, 3, samples), np.float32))
         self.is_composed = False
         self._lobe_document: Mapping[str, Any] | None = None
@@ -64,8 +75,8 @@ class LiveTerm:
 
     @cached_property
     def _theta_o(self) -> F64:
-        """Outgoing angle of each sample, radians; computed at the first curve of it."""
-        return np.arccos(self._cos_theta_o)
+        """Outgoing angle of each sample, radians."""
+        return np.arccos(self._read_cosine())
 
     def keep_displayed(self, before: LiveTerm, rows: Shaped[NDArray[np.integer], " n"]) -> None:
         """Display the image of another term of the same samples until an image of this one is ready.

@@ -33,12 +33,12 @@ class MaterialImage:
         rows = view.rows(index)
         self.num_samples = rows.stop - rows.start
         self._first = rows.start
-        self._cos_theta_o, self._levels = view.cos_theta_o[rows], view.roughness_levels(index)
+        self._levels = view.roughness_levels(index)
         self._is_mirrored = view.is_mirrored[rows] if view.is_mirrored[rows].any() else None
         self._textures = view.textures[index]
         self.documents = list(documents)
         self._light = light
-        self.terms = [LiveTerm(document, self._cos_theta_o, self._levels, light) for document in documents]
+        self.terms = [self._live_term(document) for document in documents]
         self._emission: tuple[tuple[float, float, float], EmissionImage | None] = (0.0, 0.0, 0.0), None
         self._uv: UvTransform | None = None
         self._emission_pattern: F32 | None = None
@@ -51,6 +51,11 @@ class MaterialImage:
         self.num_composed = 0
         self._num_pixel_blocks: dict[int, int] = {}
         self._in_region: tuple[Tile, NDArray[np.bool_]] | None = None
+
+    def _live_term(self, document: Mapping[str, Any]) -> LiveTerm:
+        return LiveTerm(
+            document, self.num_samples, lambda: self._view.cos_theta_o(self.index), self._levels, self._light
+        )
 
     def set_view(self, view: View) -> None:
         """Set a view in which the samples of other materials have changed, but not those of this one."""
@@ -85,7 +90,7 @@ class MaterialImage:
         num_terms = len(self.terms)
         for k, document in enumerate(documents):
             if k >= num_terms:
-                self.terms.append(LiveTerm(document, self._cos_theta_o, self._levels, self._light))
+                self.terms.append(self._live_term(document))
             elif document != self.documents[k]:
                 self.terms[k].set_document(document)
         del self.terms[len(documents) :]

@@ -82,8 +82,9 @@ def _shading_points(x: NDArray[np.float64], y: NDArray[np.float64]) -> ShadingPo
     points = SurfacePoints(normal, normal, tangent, np.arange(len(x), dtype=np.uint32))
     # a texture repeats four times around the sphere, upright
     azimuth, elevation = 2 * np.arctan2(x, normal[:, 2]) / np.pi, 2 * np.arcsin(y) / np.pi
-    uv = np.stack([azimuth, -elevation, np.full(len(x), _PIXEL), np.zeros(len(x)), np.ones(len(x))], axis=1)
-    return ShadingPoints(points, np.tile(_TO_CAMERA, (len(x), 1)), visible, uv=uv.astype(np.float32))
+    columns = azimuth, -elevation, np.full(len(x), _PIXEL), np.zeros(len(x)), np.ones(len(x))
+    uv = np.stack(columns, axis=1).astype(np.float32)
+    return ShadingPoints(points, np.tile(_TO_CAMERA, (len(x), 1)), visible, read_uv=lambda: uv)
 
 
 def _shade(

@@ -85,7 +85,7 @@ def reference_radiance(scene, transfer, material, rows, look):
         image *= transfer.store.read(f"views/0/{document['texture']}")[first + rows]
         for curve in TERMS[document["model"]].curves:
             if curve.depends_on_view:
-                image *= curve_values(document, curve, np.arccos(view.cos_theta_o[first + rows])).T
+                image *= curve_values(document, curve, np.arccos(view.cos_theta_o(material)[rows])).T
         total += image
     return np.array(look.environment.gain) * total
 

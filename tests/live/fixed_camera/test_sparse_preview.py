@@ -10,6 +10,9 @@ from session_edits import BUDGET, kind_of, make_look, relative_rmse, run_until_e
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.sparse_preview import choose_samples
+from relume.views.pixel_blocks import block_sizes
+
+FEW = 600  # samples
 
 
 def rotated(degrees):
@@ -31,7 +34,7 @@ def make(picture, need):
 @pytest.fixture
 def few(monkeypatch):
     """As few samples as for a picture of 200 × 150, and no light of all samples."""
-    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", 600)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._NUM_SHADED", FEW)
     monkeypatch.setattr("relume.live.fixed_camera.strategies.dense_light._MAX_PAIRS", 0)
 
 
@@ -97,8 +100,9 @@ def test_without_memory_there_is_no_preview(transfer):
 @pytest.mark.usefixtures("few")
 def test_other_samples_are_means_of_their_neighbors(transfer):
     view = transfer.views["front"]
+    sizes = block_sizes(view, FEW)
     for material in range(len(transfer.material_names)):
-        sparse = choose_samples(transfer, view, material, 0, has_indirect=True)
+        sparse = choose_samples(transfer, view, material, int(sizes[material]), has_indirect=True)
         rows = view.rows(material)
         num_samples, num_shaded = sparse.weights.shape
         assert num_samples == rows.stop - rows.start

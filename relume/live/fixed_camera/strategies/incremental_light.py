@@ -300,7 +300,8 @@ class _MovedLights:
 
         def read() -> SurfacePoints:
             points = view.all_surface_points()
-            return points._replace(normal=points.normal * (view.cos_theta_o > 0)[:, None].astype(np.float32))
+            cosine = np.concatenate([view.cos_theta_o(material) for material in range(len(view.bounds) - 1)])
+            return points._replace(normal=points.normal * (cosine > 0)[:, None].astype(np.float32))
 
         return self._images.cache.get_value((*self._view_key, "points"), read)
 

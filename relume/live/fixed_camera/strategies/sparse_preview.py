@@ -14,7 +14,7 @@ ends, all samples are shaded. In large images finer previews come first, each wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
+from relume.core.thread_pools import map_ordered
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, direct_only
@@ -80,19 +81,18 @@ class SampleSubset:
 
 
 def choose_samples(
-    transfer: FixedViewTransfer, view: View, material: int, detail: int, *, has_indirect: bool
+    transfer: FixedViewTransfer, view: View, material: int, block_size: int, *, has_indirect: bool
 ) -> SampleSubset:
-    """Select one sample per pixel block of a material, of smaller blocks where it bends; reads the store.
+    """Select one sample per pixel block of a material; reads the store.
 
     The others are averages of the nearest selected samples, by image position and normal.
 
     Args:
         transfer: an open bake. view: one of its views. material: index of the material.
-        detail: number of refinements. has_indirect: they are shaded with indirect light.
+        block_size: side of a block, pixels. has_indirect: they are shaded with indirect light.
     """
-    step = int(block_sizes(view, _num_shaded(detail))[material])
-    sample_indices = one_per_block(view, material, step)
-    neighbors, weight = nearest_chosen(view, material, sample_indices, step, _NUM_NEIGHBORS, _SOFTENING)
+    sample_indices = one_per_block(view, material, block_size)
+    neighbors, weight = nearest_chosen(view, material, sample_indices, block_size, _NUM_NEIGHBORS, _SOFTENING)
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(sample_indices))
     weights = csr_array((weight.ravel(), neighbors.ravel(), first), shape=shape)
     weights.eliminate_zeros()
@@ -104,15 +104,26 @@ def _num_shaded(detail: int) -> int:
     return _NUM_SHADED * int(_DETAIL_FACTOR**detail)
 
 
-def _sample_subset(images: ViewImages, material: int, light: Illumination, detail: int) -> SampleSubset:
-    """Cached sample subset of a material; subsets of finer previews are held in the transient cache."""
-    has_indirect = light.paths.has_indirect
+def _sample_subsets(
+    images: ViewImages, materials: Iterable[int], light: Illumination, detail: int
+) -> dict[int, SampleSubset]:
+    """Return cached subsets of the samples of materials, of smaller blocks where these bend; read side by side.
 
-    def choose() -> SampleSubset:
-        return choose_samples(images.transfer, images.view, material, detail, has_indirect=has_indirect)
+    Subsets of finer previews are held in the transient cache.
+    """
+    sizes, cache = block_sizes(images.view, _num_shaded(detail)), images.cache.transient if detail else images.cache
 
-    cache = images.cache.transient if detail else images.cache
-    return cache.get(_key(images, material, light, detail), SampleSubset, _subset_bytes(images, material), choose)
+    def choose(material: int) -> SampleSubset:
+        choose_args, has_indirect = (material, int(sizes[material])), light.paths.has_indirect
+        return cache.get(
+            _key(images, material, light, detail),
+            SampleSubset,
+            _subset_bytes(images, material),
+            lambda: choose_samples(images.transfer, images.view, *choose_args, has_indirect=has_indirect),
+        )
+
+    largest_first = sorted(materials, key=lambda material: -_subset_bytes(images, material))
+    return dict(zip(largest_first, map_ordered(choose, largest_first, len(largest_first)), strict=True))
 
 
 def _key(images: ViewImages, material: int, light: Illumination, detail: int = 0) -> tuple[Hashable, ...]:
@@ -233,8 +244,10 @@ class SparsePreview:
         previews, shader = [], None
         if self.lobe_terms:
             shader = self.images.transfer.few_lobe_rays(self.light, is_canceled, LightQuality.PREVIEW)
+        materials = {snapshot.target.material.index for snapshot in self.snapshots}
+        subsets = _sample_subsets(self.images, materials, self.light, self.detail)
         for k, snapshot in enumerate(self.snapshots):
-            subset = _sample_subset(self.images, snapshot.target.material.index, self.light, self.detail)
+            subset = subsets[snapshot.target.material.index]
             dense = self._dense_image(k, is_canceled)
             if shader is not None and k in self.lobe_terms:
                 term_args = snapshot.target, self.light, shader, snapshot.document, snapshot.view_factor
