@@ -10,7 +10,6 @@ from relume.export.export_document import ExportDocument
 from relume.export.export_materials import ExportMaterial
 from relume.image_io.contrast import NEUTRAL_CONTRAST
 from relume.image_io.white_balance import NEUTRAL_TEMPERATURE
-from relume.look.model import AreaLook
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,6 @@ def omitted_from_scene_files(export: ExportDocument) -> tuple[str, ...]:
     """Sentences about a look that no file with materials has."""
     display, transport = export.look.display, export.look.transport
     sentences = {
-        "Area lights become visible emissive meshes.": any(isinstance(light, AreaLook) for _, light in export.lights()),
         "Gobos of lights are not exported.": any(getattr(light, "gobo", None) for _, light in export.lights()),
         "Exposure and tone mapping are settings of the program that opens the file.": display.exposure != 0,
         "The white balance of the display is not exported.": (display.temperature, display.tint)

@@ -44,8 +44,10 @@ def omitted_from_glb(export: ExportDocument) -> tuple[str, ...]:
     """Sentences about what a GLB file does not have."""
     has_profile = any(getattr(light, "profile", None) for _, light in export.lights())
     is_linked = any(light.link or light.shadow_link for _, light in export.lights())
+    has_area_light = any(isinstance(light, AreaLook) for _, light in export.lights())
     return (
         f"The environment {export.environment_name} is not part of the file.",
+        *(["Area lights become visible emissive meshes."] if has_area_light else []),
         *(["IES files of lights are not exported."] if has_profile else []),
         *(["Lights light all objects in the file, and all cast shadows: glTF has no links."] if is_linked else []),
     )

@@ -173,3 +173,12 @@ def test_the_report_names_what_preview_surfaces_lack() -> None:
     scene = scene_of(Material("Felt", terms_of(PLASTIC, CoatLayer(sheen=(0.3, 0.2, 0.1), sheen_roughness=0.5))))
     report = export_report(export_of(scene), FORMATS["usd"])
     assert report.omitted == ("Programs that read UsdPreviewSurface alone show “Felt” simplified.",)
+
+
+def test_the_report_does_not_say_that_area_lights_become_meshes() -> None:
+    panel = Light("Panel", {"kind": "rectangle", "position": [0.0, 1.0, 2.0], "emission": [2.0, 2.0, 2.0]})
+    for name, sentence in (("usd", ()), ("glb", ("Area lights become visible emissive meshes.",))):
+        omitted = export_report(
+            export_of(scene_of(Material("Felt", terms_of(PLASTIC)), lights=(panel,))), FORMATS[name]
+        ).omitted
+        assert tuple(each for each in omitted if "meshes" in each) == sentence
