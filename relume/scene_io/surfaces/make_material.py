@@ -197,7 +197,7 @@ class SurfaceMaterials:
         else:
             metallic = float(textures.mean(surface.metallic, "metallic")[0])
             tint = (1 - metallic) * textures.mean(surface.transmission_color, "transmission color")
-        absorbed = -np.log(np.maximum(surface.attenuation_color, 1e-6)) / surface.attenuation_distance
+        absorbed = np.log(1 / np.maximum(surface.attenuation_color, 1e-6)) / surface.attenuation_distance
         red, green, blue = np.clip(tint * transmission, 0, 1).tolist()
         r, g, b = absorbed.tolist() if surface.thickness > 0 else (0.0, 0.0, 0.0)
         roughness = base.roughness if surface.transmission_roughness is None else surface.transmission_roughness
