@@ -32,6 +32,6 @@ def test_a_closed_room_opens_inside():
 
 
 @pytest.mark.parametrize("faces", [OUTWARD, OUTWARD[:3]], ids=["a solid", "an open corner"])
-def test_other_scenes_are_seen_from_outside(faces):
+def test_other_scenes_open_outside(faces):
     (camera,) = box(faces).cameras
     assert not is_inside(camera)
