@@ -7,18 +7,13 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from relume.assets.environments.environment import Environment
 from relume.core.errors import SceneError
-from relume.raytrace.interior import interior_camera, sees_only_outside
-from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Scene
 from relume.scene_io.gltf import import_gltf
-from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.import_options import ImportOptions
 from relume.scene_io.obj_ply import import_obj, import_ply, import_stl, is_stl
-from relume.scene_io.placement import bounds, place
+from relume.scene_io.placement import place
 from relume.scene_io.referenced_files import Companions, Folder, NoFiles
 from relume.scene_io.root_layer import is_usd
 from relume.scene_io.text_encoding import to_utf8
@@ -58,19 +53,7 @@ def import_scene(
     data = to_utf8(data)
     options = options or ImportOptions()
     scene = _read(data, name, environment, companions, options)
-    return _opened_inside(replace(place(scene, options), ies_files=scene.ies_files))
-
-
-def _opened_inside(scene: Scene) -> Scene:
-    """Move the camera of a scene whose file has none into its room, if it is a closed one."""
-    camera = scene.cameras[0]
-    if len(scene.cameras) > 1 or not np.array_equal(camera.to_world, framing_camera(scene.meshes, "").to_world):
-        return scene
-    geometry = build_scene_buffers(scene)
-    interior = interior_camera(geometry.embree, geometry.face_normals, bounds(scene), camera.name)
-    if interior is None or not sees_only_outside(geometry.embree, geometry.face_normals, camera, interior):
-        return scene
-    return replace(scene, cameras=(interior,))
+    return replace(place(scene, options), ies_files=scene.ies_files)
 
 
 def _read(
