@@ -18,7 +18,6 @@ from relume.brdf.texture_slots import EmissionImage
 from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.core.thread_pools import map_ordered
 from relume.images.image_store import load_emission_image, load_texture
 from relume.math.uv_transform import UvTransform
 from relume.patches.hit_distance import mean_inverse_distance
@@ -410,8 +409,6 @@ def open_view(
     if num_surface and int(material[num_surface - 1]) >= num_materials:
         raise ChunkDamagedError(prefix, "a sample has a material that does not exist in the scene")
     bounds = np.searchsorted(material[:num_surface], np.arange(num_materials + 1)).astype(np.int64)
-    ends = list(pairwise(bounds.tolist()))
-    textures = list(map_ordered(lambda rows: _textures(store, prefix, *rows), ends, len(ends)))
     level, pairs = read_roughness_levels(store, index, num_surface), read_level_pairs(store)
     if any(not _are_valid_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], pairs, strict=True)):
         raise ChunkDamagedError(prefix, "its roughness levels do not fit its materials")
@@ -438,7 +435,7 @@ def open_view(
         origin=origin,
         mirrored=mirrored,
         is_mirrored=is_mirrored.astype(np.bool_, copy=False),
-        textures=textures,
+        textures=[_textures(store, prefix, *ends) for ends in pairwise(bounds.tolist())],
         level=level,
         level_pairs=pairs,
         maps=maps,
