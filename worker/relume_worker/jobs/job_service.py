@@ -99,7 +99,8 @@ class JobService:
             try:
                 while self._claim_next():
                     pass
-                self._outage.report_recovered()
+                if not self._closing.is_set():  # else nothing was tried
+                    self._outage.report_recovered()
             except Exception as error:  # the thread must survive an unavailable database
                 self._outage.report_failure(error)
             self._wake.wait(timeout=POLL_INTERVAL_S)
